@@ -1,0 +1,1 @@
+"""Command line: parse, one library call, print."""

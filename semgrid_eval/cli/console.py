@@ -1,0 +1,69 @@
+"""What the commands show: progress bars on a terminal, plain lines elsewhere, always on stderr."""
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import click
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.progress import Progress as RichProgress
+
+from semgrid_eval.progress import Progress
+
+PLAIN_LINE_INTERVAL_S = 10.0
+
+
+def say(text: str) -> None:
+    """Print one line of status on stderr."""
+    click.echo(text, err=True)
+
+
+@contextmanager
+def progress(label: str) -> Iterator[Progress]:
+    """Show one progress bar named `label` while the block runs (a plain line now and then off a terminal)."""
+    if sys.stderr.isatty():
+        yield from _bar(label)
+    else:
+        yield _PlainLines(label)
+
+
+def _bar(label: str) -> Iterator[Progress]:
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[message]}", markup=False),
+    )
+    with RichProgress(*columns, console=Console(stderr=True)) as bars:
+        task = bars.add_task(label, total=None, message="")
+
+        def update(done: int, total: int, message: str = "") -> None:
+            bars.update(task, completed=done, total=total, message=message)
+
+        yield update
+
+
+class _PlainLines:
+    """Progress as lines for logs: the first, the last, and one every ten seconds."""
+
+    def __init__(self, label: str) -> None:
+        self._label = label
+        self._last_s = -PLAIN_LINE_INTERVAL_S
+
+    def __call__(self, done: int, total: int, message: str = "") -> None:
+        now_s = time.monotonic()
+        if done >= total or now_s - self._last_s >= PLAIN_LINE_INTERVAL_S:
+            self._last_s = now_s
+            say(f"{self._label}: {done}/{total} {message}".rstrip())

@@ -1,0 +1,83 @@
+"""Strict, frozen configuration: an unknown key or impossible value is an error naming file, place and allowed keys."""
+
+import json
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from semgrid_eval.errors import ConfigError
+
+_YAML_LIMIT_BYTES = 1 << 20
+
+
+class Config(BaseModel):
+    """Base of every configuration: frozen, strict, no unknown keys."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+
+C = TypeVar("C", bound=BaseModel)
+
+
+def parse_config(model: type[C], value: object, *, path: Path | str | None = None) -> C:
+    """Validate a plain value against a config class.
+
+    Raises:
+        ConfigError: names the place of the first fault, the value found there and, for a key, the allowed ones.
+    """
+    try:
+        # JSON is the strict border: it allows lists for tuples and names for enums, and nothing else that YAML guesses.
+        return model.model_validate_json(json.dumps(value, default=str))
+    except ValidationError as error:
+        raise _first_fault(model, error, path) from None
+    except ValueError as error:
+        raise ConfigError(str(error), path=path) from None
+
+
+def load_yaml(path: Path) -> Any:  # noqa: ANN401 - anything that YAML can hold
+    """Read a YAML file safely (no tags that build objects, at most 1 MiB).
+
+    Raises:
+        ConfigError: the file cannot be read or is not YAML.
+    """
+    try:
+        if path.stat().st_size > _YAML_LIMIT_BYTES:
+            raise ConfigError("is larger than 1 MiB, which no configuration needs", path=path)
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror or error}", path=path) from error
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        raise ConfigError(f"is not valid YAML: {error}", path=path) from error
+
+
+def _first_fault(model: type[BaseModel], error: ValidationError, path: Path | str | None) -> ConfigError:
+    fault = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in fault["loc"]) or "(top level)"
+    message = fault["msg"].removeprefix("Value error, ")
+    if fault["type"] == "extra_forbidden":
+        allowed = ", ".join(_allowed_keys(model, fault["loc"][:-1]))
+        return ConfigError(f"unknown key; allowed here: {allowed}", path=path, field=place)
+    shown = repr(fault.get("input"))
+    shown = shown if len(shown) <= 80 else shown[:77] + "..."
+    return ConfigError(f"{message} (found {shown})", path=path, field=place)
+
+
+def _allowed_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+    """Walk down the config classes along `location` as far as their annotations tell."""
+    current: type[BaseModel] | None = model
+    for part in location:
+        if current is not None and part in current.model_fields:
+            current = _config_class(current.model_fields[str(part)].annotation) or current
+    return sorted(current.model_fields) if current is not None else []
+
+
+def _config_class(annotation: Any) -> type[BaseModel] | None:  # noqa: ANN401 - a type annotation
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for part in getattr(annotation, "__args__", ()):
+        found = _config_class(part)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,42 @@
+"""The family of errors that a user can cause; each message is one line that names file, field and value."""
+
+from pathlib import Path
+
+
+class SemgridError(Exception):
+    """Base of every error that is reported to the user as one line, without a traceback."""
+
+
+class InputError(SemgridError):
+    """A file or value given by the user cannot be used.
+
+    Args:
+        message: what is wrong, in a few words.
+        path: the file at fault.
+        field: the field in that file, or the option, at fault.
+    """
+
+    def __init__(self, message: str, *, path: Path | str | None = None, field: str | None = None) -> None:
+        self.path = None if path is None else Path(path)
+        self.field = field
+        where = [str(part) for part in (path, field) if part is not None]
+        super().__init__(": ".join([*where, " ".join(message.split())]))
+
+
+class ConfigError(InputError):
+    """A configuration file or option is malformed, unknown or impossible."""
+
+
+class LogError(InputError):
+    """An MCAP log is damaged, incomplete or lacks what is needed."""
+
+
+class ResultError(InputError):
+    """A result folder does not parse or does not belong where it lies."""
+
+
+class MissingExtraError(SemgridError):
+    """An optional dependency is not installed; the message names the extra to install."""
+
+    def __init__(self, extra: str, package: str) -> None:
+        super().__init__(f"{package} is not installed; run: pip install 'semgrid-eval[{extra}]'")

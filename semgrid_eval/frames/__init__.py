@@ -1,0 +1,1 @@
+"""Sources: where calibrated camera frames and motion come from."""

@@ -1,0 +1,126 @@
+"""What every source gives and every log holds: calibrated camera frames, motion samples and, where known, the truth."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, fields
+
+from semgrid_eval.errors import InputError
+
+
+@dataclass(frozen=True)
+class CameraCalibration:
+    """A stereo camera as Cityscapes describes it.
+
+    Focal lengths and principal point are in pixels of the source image. Position and angles place the camera in the
+    ISO 8855 vehicle frame (x forward, y left, z up, origin on the ground under the rear axle); the angles are those of
+    the paper's R (yaw about z, pitch about y: positive looks down, roll about x).
+    """
+
+    fx_px: float
+    fy_px: float
+    u0_px: float
+    v0_px: float
+    baseline_m: float
+    x_m: float
+    y_m: float
+    z_m: float
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if not math.isfinite(value):
+                raise InputError(f"{value} is not a finite number", field=entry.name)
+        for name in ("fx_px", "fy_px", "baseline_m"):
+            if getattr(self, name) <= 0:
+                raise InputError(f"{getattr(self, name)} is not positive", field=name)
+
+
+@dataclass(frozen=True)
+class MotionSample:
+    """What the vehicle reports of its own motion at one time; GPS where it has one."""
+
+    stamp_ns: int
+    speed_mps: float
+    yaw_rate_radps: float  # left-positive
+    latitude_deg: float | None = None
+    longitude_deg: float | None = None
+    heading_deg: float | None = None  # clockwise from north, as GPS gives it
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A planar pose of the vehicle frame in a fixed map frame (x east, y north, yaw counter-clockwise from x)."""
+
+    stamp_ns: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True)
+class Actor:
+    """The true box of another road user in the map frame of `Pose`; x, y is the centre of its footprint."""
+
+    actor_id: int  # equals the instance value of its pixels
+    label_id: int  # Cityscapes label id
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    length_m: float
+    width_m: float
+    height_m: float
+    velocity_x_mps: float
+    velocity_y_mps: float
+
+
+@dataclass(frozen=True)
+class CameraFrame:
+    """One moment of one camera; images are PNG files as bytes, untouched, all of one size.
+
+    Disparity is 16 bit: d_px = (p - 1) / 256 and p = 0 is invalid. Labels are 8-bit Cityscapes label ids.
+    """
+
+    stamp_ns: int
+    image_png: bytes | None
+    disparity_png: bytes
+    label_png: bytes | None
+    exact_label_png: bytes | None = None  # truth: labels without the errors of a segmentation network
+    exact_disparity_png: bytes | None = None  # truth: disparity of the exact depth, coded like disparity
+    instance_png: bytes | None = None  # truth: 16-bit actor id of each pixel, 0 where there is no actor
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Everything a source knows of one time stamp: a frame for each camera that has one, motion and truth."""
+
+    stamp_ns: int
+    cameras: dict[str, CameraFrame]
+    motion: tuple[MotionSample, ...] = ()  # samples since the last moment
+    pose: Pose | None = None
+    actors: tuple[Actor, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One stretch of driving, streamed moment by moment.
+
+    Args:
+        name: unique in its data set, a valid file name without suffix (Cityscapes: `city_sequence_frame0`).
+        dataset: where it comes from: `cityscapes` or `synthetic`.
+        split: `train`, `val` or `test`.
+        calibrations: by camera name.
+        source_digest: digest of everything that determines the content.
+        moments: starts a fresh pass over the recording, in the order of time.
+        source_files: one file's bytes by attachment name (`front_camera.json`), kept for the record.
+    """
+
+    name: str
+    dataset: str
+    split: str
+    calibrations: dict[str, CameraCalibration]
+    source_digest: str
+    moments: Callable[[], Iterator[Moment]]
+    source_files: dict[str, bytes] = field(default_factory=dict)

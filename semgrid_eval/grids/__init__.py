@@ -1,0 +1,1 @@
+"""Semantic grids: from labelled points to aligned bird's-eye cells."""

@@ -1,0 +1,1 @@
+"""MCAP logs: the border between sources and everything that reads."""

@@ -1,0 +1,1 @@
+"""Predictors: baselines and the encoder-decoder, with its training."""

@@ -1,0 +1,1 @@
+"""Experiment matrices that come with the package."""

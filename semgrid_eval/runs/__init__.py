@@ -1,0 +1,1 @@
+"""Experiment matrices and the runner that works them off."""

@@ -1,0 +1,1 @@
+"""Scores: integer confusion counts per window and what follows from them."""

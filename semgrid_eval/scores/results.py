@@ -1,0 +1,209 @@
+"""Result files: what a run leaves on disk and all that a report reads.
+
+```
+RUN/run.json                   RunRecord: provenance, logs, rows and, for each row, its results by id
+RUN/results/<id>/result.json   ResultRecord
+RUN/results/<id>/counts.npz    counts (N, C, C) int64, [target, prediction], mask M left out
+RUN/results/<id>/history.csv   of trained models: epoch, updates, learning_rate, loss, validation_loss, seconds
+RUN/results/<id>/predictions.npz   prediction (N, H, W) uint8 class ids, certainty (N, H, W) uint8 (255 = 1.0)
+RUN/windows/<id>.npz           inputs (N, S, T, H, W) uint8 aligned, target (N, H, W) uint8, mask (N, H, W) bool
+```
+"""
+
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.config import Config, parse_config
+from semgrid_eval.errors import ConfigError, ResultError
+from semgrid_eval.files import atomic_file, read_json, write_json
+
+FORMAT_VERSION = 1
+_ARRAY_LIMIT_BYTES = 8 << 30
+
+
+class LogRecord(Config):
+    """A log that took part in a run."""
+
+    name: str
+    path: str
+    digest: str
+    split: str
+    dataset: str
+
+
+class WindowRecord(Config):
+    """One scored window: its recording, the index of its target frame there and that frame's time."""
+
+    recording: str
+    log: str
+    target_frame: int
+    target_stamp_ns: int
+
+
+class ResultRecord(Config):
+    """One scored predictor with one seed."""
+
+    format_version: int
+    id: str
+    config: dict[str, object]
+    log_digests: tuple[str, ...]
+    seed: int | None  # None: the predictor does not depend on chance
+    windows_id: str  # names RUN/windows/<windows_id>.npz
+    windows: tuple[WindowRecord, ...]
+    device: str
+    train_seconds: float | None
+    predict_seconds: float
+    parameters: int | None
+
+
+class RowRecord(Config):
+    """One row of the matrix; a failed row has a reason instead of results."""
+
+    name: str  # unique in the run, e.g. "ED-DC"
+    experiment: str  # "DC", "NT", "Sp2", "PH3", ...
+    model: str  # "ED", "BL", ...
+    label: str  # for readers: name and what it does
+    inputs: int
+    step_frames: int
+    horizon_steps: int
+    sensors: tuple[str, ...]
+    translate: bool
+    results: tuple[str, ...] = ()
+    failure: str | None = None
+
+
+class RunRecord(Config):
+    """A whole run: what was asked, with what, and where each row's results lie."""
+
+    format_version: int
+    title: str
+    command: str
+    matrix: dict[str, object]
+    versions: dict[str, str]
+    machine: dict[str, str]
+    started: str  # ISO 8601, UTC
+    seconds: float
+    logs: tuple[LogRecord, ...]
+    failed_logs: dict[str, str]  # log path -> reason
+    rows: tuple[RowRecord, ...]
+
+
+def run_file(run: Path) -> Path:
+    """Where the record of a run lies."""
+    return run / "run.json"
+
+
+def result_folder(run: Path, result_id: str) -> Path:
+    """Where a result lies."""
+    return run / "results" / result_id
+
+
+def windows_file(run: Path, windows_id: str) -> Path:
+    """Where a set of windows lies."""
+    return run / "windows" / f"{windows_id}.npz"
+
+
+def write_run(run: Path, record: RunRecord) -> None:
+    """Write a run's record atomically."""
+    write_json(run_file(run), record.model_dump(mode="json"))
+
+
+def read_run(run: Path) -> RunRecord:
+    """Read a run's record.
+
+    Raises:
+        InputError: it is missing, malformed or of another format version.
+    """
+    if not run_file(run).is_file():
+        raise ResultError("no run lies here (it has no run.json)", path=run)
+    record = parse_config(RunRecord, read_json(run_file(run)), path=run_file(run))
+    _check_version(record.format_version, run_file(run))
+    return record
+
+
+def read_result(folder: Path) -> ResultRecord:
+    """Read a result's record and check that it belongs to its folder.
+
+    Raises:
+        InputError: it is missing, malformed, of another format version or under another id's name.
+    """
+    path = folder / "result.json"
+    record = parse_config(ResultRecord, read_json(path), path=path)
+    _check_version(record.format_version, path)
+    if record.id != folder.name:
+        raise ResultError(f"belongs to another folder than {folder.name}", path=path, field="id")
+    return record
+
+
+def write_result(folder: Path, record: ResultRecord) -> None:
+    """Write a result's record."""
+    write_json(folder / "result.json", record.model_dump(mode="json"))
+
+
+def is_done(folder: Path) -> bool:
+    """Tell whether a result parses, matches its id and has counts of the right shape."""
+    try:
+        return len(read_counts(folder)) == len(read_result(folder).windows)
+    except (ResultError, ConfigError, OSError, ValueError):
+        return False
+
+
+def read_counts(folder: Path) -> NDArray[np.int64]:
+    """Read the confusion counts (N, C, C) of a result.
+
+    Raises:
+        ResultError: they are missing or malformed.
+    """
+    counts = read_arrays(folder / "counts.npz", ("counts",))["counts"]
+    if counts.ndim != 3 or counts.shape[1:] != (CLASS_COUNT, CLASS_COUNT) or counts.dtype != np.int64:
+        raise ResultError(f"has shape {counts.shape}, type {counts.dtype}", path=folder / "counts.npz", field="counts")
+    return counts.astype(np.int64, copy=False)
+
+
+def read_history(folder: Path) -> pd.DataFrame | None:
+    """Read the training history of a result, None where nothing was trained."""
+    path = folder / "history.csv"
+    return pd.read_csv(path) if path.is_file() else None
+
+
+def write_arrays(path: Path, arrays: dict[str, NDArray[np.generic]]) -> None:
+    """Write arrays as a compressed npz, atomically, the same arrays always giving the same bytes."""
+    with atomic_file(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=4) as archive:
+        for name, array in arrays.items():
+            buffer = io.BytesIO()
+            np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
+            entry = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, buffer.getvalue())
+
+
+def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[np.generic]]:
+    """Read the named arrays of an npz, sizes bounded, nothing pickled.
+
+    Raises:
+        ResultError: the file is missing, damaged, too large or lacks an array.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > _ARRAY_LIMIT_BYTES:
+            raise ResultError(f"would need {size >> 20} MiB", path=path)
+        with np.load(path, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in names}
+    except KeyError as error:
+        raise ResultError(f"has no array {error}", path=path) from error
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise ResultError(f"cannot be read: {error}", path=path) from error
+
+
+def _check_version(found: int, path: Path) -> None:
+    if found != FORMAT_VERSION:
+        raise ResultError(
+            f"{found} is not {FORMAT_VERSION}, which this version reads", path=path, field="format_version"
+        )

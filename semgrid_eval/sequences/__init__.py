@@ -1,0 +1,1 @@
+"""Windows of input and target grids, and batches of them."""
