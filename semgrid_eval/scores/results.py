@@ -10,21 +10,20 @@ RUN/windows/<id>.npz           inputs (N, S, T, H, W) uint8 aligned, target (N, 
 ```
 """
 
-import io
-import zipfile
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from semgrid_eval.arrays import read_arrays as read_arrays
+from semgrid_eval.arrays import write_arrays as write_arrays
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import ConfigError, ResultError
-from semgrid_eval.files import atomic_file, read_json, write_json
+from semgrid_eval.files import read_json, write_json
 
 FORMAT_VERSION = 1
-_ARRAY_LIMIT_BYTES = 8 << 30
 
 
 class LogRecord(Config):
@@ -170,36 +169,6 @@ def read_history(folder: Path) -> pd.DataFrame | None:
     """Read the training history of a result, None where nothing was trained."""
     path = folder / "history.csv"
     return pd.read_csv(path) if path.is_file() else None
-
-
-def write_arrays(path: Path, arrays: dict[str, NDArray[np.generic]]) -> None:
-    """Write arrays as a compressed npz, atomically, the same arrays always giving the same bytes."""
-    with atomic_file(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=4) as archive:
-        for name, array in arrays.items():
-            buffer = io.BytesIO()
-            np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
-            entry = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(entry, buffer.getvalue())
-
-
-def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[np.generic]]:
-    """Read the named arrays of an npz, sizes bounded, nothing pickled.
-
-    Raises:
-        ResultError: the file is missing, damaged, too large or lacks an array.
-    """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > _ARRAY_LIMIT_BYTES:
-            raise ResultError(f"would need {size >> 20} MiB", path=path)
-        with np.load(path, allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in names}
-    except KeyError as error:
-        raise ResultError(f"has no array {error}", path=path) from error
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise ResultError(f"cannot be read: {error}", path=path) from error
 
 
 def _check_version(found: int, path: Path) -> None:

@@ -1,0 +1,44 @@
+"""Named arrays on disk: compressed npz files with bounded sizes, nothing pickled, equal arrays giving equal bytes."""
+
+import io
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.errors import ResultError
+from semgrid_eval.files import atomic_file
+
+_ARRAY_LIMIT_BYTES = 8 << 30
+
+
+def write_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
+    """Write arrays as a compressed npz, atomically, the same arrays always giving the same bytes."""
+    with atomic_file(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=4) as archive:
+        for name, array in arrays.items():
+            buffer = io.BytesIO()
+            np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
+            entry = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, buffer.getvalue())
+
+
+def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    """Read the named arrays of an npz, sizes bounded, nothing pickled.
+
+    Raises:
+        ResultError: the file is missing, damaged, too large or lacks an array.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > _ARRAY_LIMIT_BYTES:
+            raise ResultError(f"would need {size >> 20} MiB", path=path)
+        with np.load(path, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in names}
+    except KeyError as error:
+        raise ResultError(f"has no array {error}", path=path) from error
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise ResultError(f"cannot be read: {error}", path=path) from error

@@ -1,0 +1,252 @@
+"""Grids of whole recordings: read a log once, make the grids of every sensor, keep them by digest."""
+
+import multiprocessing
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import closing
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.arrays import read_arrays, write_arrays
+from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, NO_POINT, class_map
+from semgrid_eval.errors import ConfigError, LogError, ResultError, SemgridError
+from semgrid_eval.files import digest_value
+from semgrid_eval.frames.png import decode_gray
+from semgrid_eval.frames.types import CameraFrame, MotionSample
+from semgrid_eval.grids.geometry import GroundRays, ground_rays, nearest_indices
+from semgrid_eval.grids.motion import integrate_motion
+from semgrid_eval.grids.rasterise import LabelledImage, count_points, rasterise
+from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.log.store import LogReader
+from semgrid_eval.progress import Progress, silent
+
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True)
+class GridRecording:
+    """The grids of one recording, all in the orientation of its first frame (reading 18).
+
+    Args:
+        name: of the recording; the stretches of a longer log are told apart by `#1`, `#2`, ...
+        log: path of its log.
+        digest: of the log.
+        split: `train`, `val` or `test`.
+        sensors: names, in the order of `grids`.
+        stamps_ns: (F,) capture times.
+        grids: (S, F, H, W) uint8 class ids; each grid is centred on the vehicle at its own time.
+        position_m: (F, 2) of the vehicle, forward and left of the first frame.
+        yaw_rad: (F,) heading against the first frame.
+    """
+
+    name: str
+    log: str
+    digest: str
+    split: str
+    sensors: tuple[str, ...]
+    stamps_ns: NDArray[np.int64]
+    grids: NDArray[np.uint8]
+    position_m: NDArray[np.float64]
+    yaw_rad: NDArray[np.float64]
+
+
+@dataclass
+class GridDataSet:
+    """The grids of many logs; `failed` holds the reason for each log that gave none."""
+
+    recordings: list[GridRecording] = field(default_factory=list)
+    failed: dict[str, str] = field(default_factory=dict)
+    built: int = 0
+    reused: int = 0
+
+
+def build_grids(
+    logs: Sequence[Path], folder: Path, config: GridConfig, *, workers: int = 1, progress: Progress = silent
+) -> GridDataSet:
+    """Make the grids of all logs, or take those that lie in `folder` already, several logs at once.
+
+    A log that fails is noted with its reason and the others go on. The order of recordings is that of `logs`.
+    """
+    outcomes: dict[Path, tuple[list[GridRecording], bool] | str] = {}
+    for done, (log, outcome) in enumerate(_outcomes(logs, folder, config, workers), start=1):
+        outcomes[log] = outcome
+        progress(done, len(logs), log.stem)
+    data = GridDataSet()
+    for log in logs:
+        outcome = outcomes[log]
+        if isinstance(outcome, str):
+            data.failed[str(log)] = outcome
+            continue
+        recordings, reused = outcome
+        data.recordings.extend(recordings)
+        data.built += not reused
+        data.reused += reused
+    return data
+
+
+def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
+    """Make the grids of one log, cut into stretches.
+
+    Raises:
+        LogError: the log is damaged or lacks what a grid needs.
+        ConfigError: the configuration names a class or camera that does not exist.
+    """
+    with closing(LogReader(log)) as reader:
+        camera = _camera(reader, config.camera, log)
+        motion = list(reader.motion())
+        frames = reader.frames(camera)
+        stretches = []
+        while stretch := list(_take(frames, config.stretch_frames)):
+            if stretches and len(stretch) < config.stretch_frames:
+                break  # the rest of a log that was cut: too short for the windows of the others
+            stretches.append(_build_stretch(stretch, motion, reader, camera, config))
+        if not stretches:
+            raise LogError(f"camera {camera} has no frames", path=log)
+        many = len(stretches) > 1
+        return [
+            GridRecording(
+                f"{reader.scene.name}#{number}" if many else reader.scene.name,
+                str(log),
+                reader.digest,
+                reader.scene.split,
+                tuple(sensor.name for sensor in config.all_sensors()),
+                *arrays,
+            )
+            for number, arrays in enumerate(stretches, start=1)
+        ]
+
+
+def grid_classes_by_label(config: GridConfig) -> NDArray[np.uint8]:
+    """Return the table (256,) from label id to grid class with the configuration's replacements (reading 21).
+
+    Raises:
+        ConfigError: a label or class name is unknown.
+    """
+    table = class_map()
+    for label, name in config.class_map.items():
+        if label not in LABEL_ID:
+            raise ConfigError(f"{label!r} is not a Cityscapes label", field="class_map")
+        if name is not None and name not in CLASS_NAMES:
+            raise ConfigError(f"{name!r} is not one of {', '.join(CLASS_NAMES)}", field=f"class_map.{label}")
+        table[LABEL_ID[label]] = NO_POINT if name is None else CLASS_NAMES.index(name)
+    return table
+
+
+class _Stretch:
+    """Turns frames into grids; what does not change from frame to frame is computed once."""
+
+    def __init__(self, reader: LogReader, camera: str, config: GridConfig) -> None:
+        self._calibration = reader.calibration(camera)
+        self._config = config
+        self._table = grid_classes_by_label(config)
+        self._rays: dict[tuple[int, int], GroundRays] = {}
+        self._crops = np.array([[s.top_px, s.bottom_px, s.left_px, s.right_px] for s in config.all_sensors()], np.int64)
+
+    def grids(self, frame: CameraFrame, yaw_rad: float) -> NDArray[np.uint8]:
+        """Return the grids (S, H, W) of one frame."""
+        width, height = self._config.image_size_px
+        disparity = decode_gray(frame.disparity_png, bit_depth=16)
+        label = decode_gray(frame.label_png or b"", bit_depth=8)
+        size = (disparity.shape[1], disparity.shape[0])
+        if size not in self._rays:
+            self._rays[size] = ground_rays(self._calibration, size, (width, height))
+        image = LabelledImage(
+            self._table[_resize(label, width, height)], np.ascontiguousarray(_resize(disparity, width, height))
+        )
+        counts = count_points(image, self._rays[size], yaw_rad, self._crops, self._config.spec)
+        return np.stack([rasterise(sensor, self._config.morphology) for sensor in counts])
+
+
+def _build_stretch(
+    frames: list[CameraFrame], motion: list[MotionSample], reader: LogReader, camera: str, config: GridConfig
+) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]:
+    stamps_ns = np.array([frame.stamp_ns for frame in frames], np.int64)
+    position_m, yaw_rad = integrate_motion(motion, stamps_ns, config.integrator)
+    stretch = _Stretch(reader, camera, config)
+    grids = np.stack([stretch.grids(frame, yaw) for frame, yaw in zip(frames, yaw_rad, strict=True)], axis=1)
+    return stamps_ns, grids, position_m, yaw_rad
+
+
+def _take(frames: Iterator[CameraFrame], count: int) -> Iterator[CameraFrame]:
+    for frame in islice(frames, count):
+        if not frame.label_png:
+            raise LogError(
+                "has no label image; add labels to the log (convert cityscapes --labels DIR)",
+                field=f"frame at {frame.stamp_ns} ns",
+            )
+        yield frame
+
+
+def _resize(image: NDArray[np.uint8] | NDArray[np.uint16], width: int, height: int) -> NDArray[np.generic]:
+    rows, columns = nearest_indices(image.shape[0], height), nearest_indices(image.shape[1], width)
+    return image[rows[:, None], columns[None, :]]
+
+
+def _camera(reader: LogReader, wanted: str | None, log: Path) -> str:
+    cameras = reader.scene.cameras
+    if wanted is None and len(cameras) == 1:
+        return cameras[0]
+    if wanted in cameras:
+        return str(wanted)
+    raise LogError(f"camera {wanted or '(not given)'} is not one of: {', '.join(cameras)}", path=log, field="camera")
+
+
+def _outcomes(
+    logs: Sequence[Path], folder: Path, config: GridConfig, workers: int
+) -> Iterator[tuple[Path, tuple[list[GridRecording], bool] | str]]:
+    if workers <= 1 or len(logs) <= 1:
+        for log in logs:
+            yield log, _build_or_reuse(log, folder, config)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(
+        min(workers, len(logs)), mp_context=context, initializer=cv2.setNumThreads, initargs=(1,)
+    ) as pool:
+        futures = {pool.submit(_build_or_reuse, log, folder, config): log for log in logs}
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+
+
+def _build_or_reuse(log: Path, folder: Path, config: GridConfig) -> tuple[list[GridRecording], bool] | str:
+    try:
+        with closing(LogReader(log)) as reader:
+            key = {"log": reader.digest, "config": config.model_dump(mode="json"), "format": FORMAT_VERSION}
+        path = folder / f"{log.stem}-{digest_value(key)}.npz"
+        try:
+            return _read(path, log), True
+        except ResultError:
+            pass  # absent or damaged: make it anew
+        recordings = build_log(log, config)
+        _write(path, recordings)
+    except SemgridError as error:
+        message = str(error)
+        return message if str(log) in message else f"{log}: {message}"
+    return recordings, False
+
+
+def _write(path: Path, recordings: list[GridRecording]) -> None:
+    first = recordings[0]
+    arrays: dict[str, NDArray[np.generic]] = {
+        "names": np.array([recording.name for recording in recordings]),
+        "log": np.array([first.digest, first.split, *first.sensors]),
+    }
+    for number, recording in enumerate(recordings):
+        for name in ("stamps_ns", "grids", "position_m", "yaw_rad"):
+            arrays[f"{name}_{number}"] = getattr(recording, name)
+    write_arrays(path, arrays)
+
+
+def _read(path: Path, log: Path) -> list[GridRecording]:
+    head = read_arrays(path, ("names", "log"))
+    digest, split, *sensors = (str(value) for value in head["log"])
+    recordings = []
+    for number, name in enumerate(head["names"]):
+        keys = tuple(f"{key}_{number}" for key in ("stamps_ns", "grids", "position_m", "yaw_rad"))
+        arrays = read_arrays(path, keys)
+        recordings.append(GridRecording(str(name), str(log), digest, split, tuple(sensors), *(arrays[k] for k in keys)))
+    return recordings
