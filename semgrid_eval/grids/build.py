@@ -27,6 +27,8 @@ from semgrid_eval.progress import Progress, silent
 
 FORMAT_VERSION = 1
 
+StretchArrays = tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]
+
 
 @dataclass(frozen=True)
 class GridRecording:
@@ -100,7 +102,7 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
         camera = _camera(reader, config.camera, log)
         motion = list(reader.motion())
         frames = reader.frames(camera)
-        stretches = []
+        stretches: list[StretchArrays] = []
         while stretch := list(_take(frames, config.stretch_frames)):
             if stretches and len(stretch) < config.stretch_frames:
                 break  # the rest of a log that was cut: too short for the windows of the others
@@ -164,7 +166,7 @@ class _Stretch:
 
 def _build_stretch(
     frames: list[CameraFrame], motion: list[MotionSample], reader: LogReader, camera: str, config: GridConfig
-) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]:
+) -> StretchArrays:
     stamps_ns = np.array([frame.stamp_ns for frame in frames], np.int64)
     position_m, yaw_rad = integrate_motion(motion, stamps_ns, config.integrator)
     stretch = _Stretch(reader, camera, config)
@@ -203,10 +205,10 @@ def _outcomes(
         for log in logs:
             yield log, _build_or_reuse(log, folder, config)
         return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        min(workers, len(logs)), mp_context=context, initializer=cv2.setNumThreads, initargs=(1,)
-    ) as pool:
+    pool = ProcessPoolExecutor(
+        min(workers, len(logs)), multiprocessing.get_context("spawn"), initializer=cv2.setNumThreads, initargs=(1,)
+    )
+    with pool:
         futures = {pool.submit(_build_or_reuse, log, folder, config): log for log in logs}
         for future in as_completed(futures):
             yield futures[future], future.result()

@@ -95,7 +95,7 @@ def _filter_class(layer: Cells, class_id: int, morphology: Morphology) -> NDArra
     return layer.astype(np.bool_)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, nogil=True)
 def _count(classes, disparity, slope, origin_m, depth_disparity, heading, crops, extent, counts):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     cell_m, agent_row, agent_column = extent
     rows, columns = counts.shape[2], counts.shape[3]
@@ -117,7 +117,7 @@ def _count(classes, disparity, slope, origin_m, depth_disparity, heading, crops,
                     counts[s, label, int(row), int(column)] += 1
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, nogil=True)
 def _strongest(counts, present, priority):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     classes, rows, columns = counts.shape
     grid = np.zeros((rows, columns), np.uint8)

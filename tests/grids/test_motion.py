@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import numpy as np
@@ -18,7 +19,7 @@ def slow_euler(samples):
     """The paper's two sums, one frame after the other."""
     x = y = yaw = 0.0
     poses = [(x, y, yaw)]
-    for before, after in zip(samples, samples[1:], strict=False):
+    for before, after in itertools.pairwise(samples):
         dt = (after.stamp_ns - before.stamp_ns) / 1e9
         x += before.speed_mps * dt * math.cos(yaw)
         y += before.speed_mps * dt * math.sin(yaw)

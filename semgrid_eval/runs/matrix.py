@@ -1,0 +1,187 @@
+"""Experiment matrices: YAML files of rows, with defaults and axes, resolved into complete rows."""
+
+import itertools
+from collections.abc import Iterator
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from semgrid_eval.config import Config, load_yaml, parse_config
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
+from semgrid_eval.models.network import NetworkConfig
+from semgrid_eval.models.training import TrainingConfig
+from semgrid_eval.sequences.windows import WindowConfig
+
+TRAINED_MODEL = "ed"
+BASELINES = {
+    "aligned": "newest input moved to the target's time",
+    "repeat": "newest input as it is",
+    "overlay": "upper sensor drawn over the lower, both moved to the target's time",
+    "fuse": "all aligned inputs overlaid, newest known cell wins",
+}
+ROW_LIMIT = 10_000
+
+
+class Row(Config):
+    """One experiment with everything that determines it.
+
+    Args:
+        name: unique in the matrix, like `ED-Sp2`; axes fill in `{key}` places.
+        experiment: the group in which a report compares rows; the name without `BL-` or `ED-` if not given.
+        model: `ed`, a baseline (`aligned`, `repeat`, `overlay`, `fuse`), or `path.py:Class` of one's own.
+        sensors: inputs, from the grid config's sensors.
+        translate: whether inputs are moved to the target's time (T2); the paper's NT rows do not.
+        overlay: which sensor the `overlay` baseline draws last (reading 20).
+        repeats: trainings with different seeds.
+    """
+
+    name: str = Field(min_length=1, max_length=200)
+    experiment: str = ""
+    model: str
+    sensors: tuple[str, ...] = Field((TARGET_SENSOR,), min_length=1)
+    translate: bool = True
+    overlay: Literal["upper", "lower"] = "upper"
+    repeats: int = Field(1, ge=1, le=1000)
+    train_split: str = "train"
+    validation_split: str = "val"
+    grid: GridConfig = GridConfig()
+    window: WindowConfig = WindowConfig()
+    network: NetworkConfig = NetworkConfig()
+    training: TrainingConfig = TrainingConfig()
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        known = [sensor.name for sensor in self.grid.all_sensors()]
+        for sensor in self.sensors:
+            if sensor not in known:
+                raise ValueError(f"sensor {sensor!r} is not one of {', '.join(known)}")
+        if self.model not in (TRAINED_MODEL, *BASELINES) and ":" not in self.model:
+            raise ValueError(
+                f"model {self.model!r} is not one of {', '.join((TRAINED_MODEL, *BASELINES))} or path.py:Class"
+            )
+        if self.model == "overlay" and len(self.sensors) != 2:
+            raise ValueError("overlay needs two sensors: the upper and the lower")
+        return self
+
+    @property
+    def trained(self) -> bool:
+        """Whether the row has weights to learn."""
+        return self.model == TRAINED_MODEL
+
+    @property
+    def group(self) -> str:
+        """The experiment that the row belongs to."""
+        return self.experiment or self.name.removeprefix("BL-").removeprefix("ED-")
+
+    @property
+    def label(self) -> str:
+        """Name and, in words, what the row does; the horizon is always said (reading 2)."""
+        what = {"ed": f"encoder-decoder d {self.network.depth}, f {self.network.features}", **BASELINES}
+        horizon = self.window.horizon_steps
+        parts = [
+            what.get(self.model, self.model),
+            f"{self.window.inputs} inputs",
+            f"{horizon} step{'s' if horizon > 1 else ''} of {self.window.step_frames} frames ahead",
+        ]
+        return f"{self.name} ({', '.join(parts)})"
+
+
+class Matrix(Config):
+    """A resolved matrix: every row complete."""
+
+    title: str
+    seed: int = Field(ge=0)
+    rows: tuple[Row, ...] = Field(min_length=1)
+
+
+class _Axes(Config):
+    grid: dict[str, list[Any]] = Field(default_factory=dict)
+    zip: dict[str, list[Any]] = Field(default_factory=dict)
+
+
+class _MatrixFile(Config):
+    title: str = Field("", max_length=200)
+    seed: int = Field(0, ge=0)
+    defaults: dict[str, Any] = Field(default_factory=dict)
+    rows: list[dict[str, Any]] = Field(min_length=1)
+
+
+def preset_names() -> list[str]:
+    """List the matrices that come with the package."""
+    files = resources.files("semgrid_eval.presets").iterdir()
+    return sorted(file.name.removesuffix(".yaml") for file in files if file.name.endswith(".yaml"))
+
+
+def load_matrix(name_or_path: str) -> Matrix:
+    """Read a matrix file, or a preset by its name.
+
+    Raises:
+        ConfigError: names file, row and key at fault.
+    """
+    if name_or_path in preset_names():
+        with resources.as_file(resources.files("semgrid_eval.presets") / f"{name_or_path}.yaml") as path:
+            return _parse(load_yaml(path), Path(f"preset {name_or_path}"))
+    path = Path(name_or_path)
+    if not path.is_file():
+        raise ConfigError(f"is neither a file nor a preset ({', '.join(preset_names())})", path=path)
+    return _parse(load_yaml(path), path)
+
+
+def _parse(value: object, path: Path) -> Matrix:
+    file = parse_config(_MatrixFile, value, path=path)
+    rows = [parse_config(Row, row, path=f"{path}: {place}") for place, row in _expanded(file, path)]
+    names = [row.name for row in rows]
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"{name!r} is the name of {names.count(name)} rows", path=path, field="rows.name")
+    return Matrix(title=file.title or path.stem, seed=file.seed, rows=tuple(rows))
+
+
+def _expanded(file: _MatrixFile, path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Merge defaults into each row and multiply it by its axes."""
+    number = 0
+    for row in file.rows:
+        place = f"row {row.get('name', '?')!r}"
+        merged = _merge(file.defaults, row)
+        axes = parse_config(_Axes, merged.pop("axes", {}), path=f"{path}: {place}.axes")
+        for values in _combinations(axes, f"{path}: {place}"):
+            number += 1
+            if number > ROW_LIMIT:
+                raise ConfigError(f"gives more than {ROW_LIMIT} rows", path=path, field="axes")
+            yield place, _fill(merged, values, f"{path}: {place}")
+
+
+def _combinations(axes: _Axes, place: str) -> Iterator[dict[str, Any]]:
+    lengths = {len(values) for values in axes.zip.values()}
+    if len(lengths) > 1:
+        raise ConfigError(f"lists of {' and '.join(map(str, sorted(lengths)))} values", path=place, field="axes.zip")
+    together = [dict(zip(axes.zip, values, strict=True)) for values in zip(*axes.zip.values(), strict=True)] or [{}]
+    for values in itertools.product(*axes.grid.values()):
+        for zipped in together:
+            yield {**dict(zip(axes.grid, values, strict=True)), **zipped}
+
+
+def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, Any]:
+    for key, value in values.items():
+        nested: Any = value
+        for part in reversed(key.split(".")):
+            nested = {part: nested}
+        row = _merge(row, nested)
+    name = str(row.get("name", ""))
+    for key, value in values.items():
+        name = name.replace("{" + key + "}", str(value))
+    if "{" in name:
+        raise ConfigError(f"{name!r} has a place that no axis fills", path=place, field="name")
+    return {**row, "name": name}
+
+
+def _merge(base: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
+    """Put `change` over `base`, mapping by mapping."""
+    merged = dict(base)
+    for key, value in change.items():
+        old = merged.get(key)
+        merged[key] = _merge(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return merged

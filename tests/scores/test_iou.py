@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sklearn.metrics import confusion_matrix, jaccard_score
+
+from semgrid_eval.classes import CATEGORY_NAMES, CLASS_COUNT, CLASS_NAMES, category_members
+from semgrid_eval.scores.iou import category_iou, class_iou, confusion, merged_category_iou
+
+
+def random_grids(seed, shape=(3, 7, 9), classes=CLASS_COUNT):
+    rng = np.random.default_rng(seed)
+    target, prediction = rng.integers(0, classes, (2, *shape), dtype=np.uint8)
+    return target, prediction, rng.random(shape) < 0.3
+
+
+def slow_iou(target, prediction, mask, class_id):
+    intersection = union = 0
+    for t, p, m in zip(target.ravel(), prediction.ravel(), mask.ravel(), strict=True):
+        if not m:
+            intersection += t == class_id and p == class_id
+            union += t == class_id or p == class_id
+    return intersection / union if union else float("nan")
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, CLASS_COUNT))
+def test_pooled_class_iou_matches_a_cell_by_cell_twin(seed, classes):
+    target, prediction, mask = random_grids(seed, classes=classes)
+    iou = class_iou(confusion(target, prediction, mask).sum(axis=0))
+    slow = [slow_iou(target, prediction, mask, c) for c in range(CLASS_COUNT)]
+    np.testing.assert_allclose(iou, slow, equal_nan=True)
+
+
+def test_counts_and_iou_match_scikit_learn():
+    target, prediction, mask = random_grids(1)
+    counts = confusion(target, prediction, mask)
+    labels = list(range(CLASS_COUNT))
+    for n in range(len(target)):
+        expected = confusion_matrix(target[n][~mask[n]], prediction[n][~mask[n]], labels=labels)
+        np.testing.assert_array_equal(counts[n], expected)
+    expected = jaccard_score(target[~mask], prediction[~mask], labels=labels, average=None)
+    np.testing.assert_allclose(class_iou(counts.sum(axis=0)), expected)
+
+
+def test_rows_are_targets_and_columns_are_predictions():
+    target, prediction = np.full((1, 2, 2), 3, np.uint8), np.full((1, 2, 2), 6, np.uint8)
+    mask = np.array([[[True, False], [False, False]]])
+    counts = confusion(target, prediction, mask)
+    assert counts[0, 3, 6] == 3
+    assert counts.sum() == 3
+
+
+def test_a_class_in_neither_grid_is_nan_and_in_one_only_is_zero():
+    target, prediction = np.zeros((1, 2, 2), np.uint8), np.zeros((1, 2, 2), np.uint8)
+    prediction[0, 0, 0] = 4
+    iou = class_iou(confusion(target, prediction, np.zeros((1, 2, 2), bool))[0])
+    assert iou[4] == 0
+    assert iou[0] == 0.75
+    assert np.isnan(iou[1])
+
+
+def test_category_value_is_the_mean_of_its_classes_that_are_present():
+    iou = np.full(CLASS_COUNT, np.nan)
+    for name, value in {"unknown": 1.0, "road": 0.8, "car": 0.5, "person": 0.4, "bicycle": 0.2}.items():
+        iou[CLASS_NAMES.index(name)] = value
+    categories = category_iou(iou)
+    assert categories["static"] == pytest.approx(0.9)
+    assert categories["static_known"] == pytest.approx(0.8)
+    assert categories["vehicles"] == pytest.approx(0.5)
+    assert categories["small_dynamic"] == pytest.approx(0.3)
+    assert np.isnan(categories["small_static"])
+    assert categories["mean_known"] == pytest.approx((0.8 + 0.5 + 0.4 + 0.2) / 4)
+
+
+def test_merged_categories_do_not_punish_confusion_within_one():
+    target, prediction, mask = random_grids(5)
+    merged = merged_category_iou(confusion(target, prediction, mask).sum(axis=0))
+    category_of = np.zeros(CLASS_COUNT, np.uint8)
+    for number, classes in enumerate(category_members().values()):
+        category_of[list(classes)] = number
+    for number, name in enumerate(CATEGORY_NAMES):
+        slow = slow_iou(category_of[target], category_of[prediction], mask, number)
+        assert merged[name] == pytest.approx(slow)
+
+
+def test_shapes_that_differ_are_refused():
+    with pytest.raises(ValueError, match="shapes differ"):
+        confusion(np.zeros((1, 2, 2), np.uint8), np.zeros((1, 2, 3), np.uint8), np.zeros((1, 2, 2), bool))

@@ -1,0 +1,46 @@
+import pytest
+
+from semgrid_eval.config import Config, load_yaml, parse_config
+from semgrid_eval.errors import ConfigError
+
+
+class Inner(Config):
+    size: int = 1
+    ratio: float = 0.5
+
+
+class Outer(Config):
+    inner: Inner = Inner()
+    names: tuple[str, ...] = ()
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ({"inner": {"sise": 2}}, "m.yaml: inner.sise: unknown key; allowed here: ratio, size"),
+        ({"iner": {}}, "m.yaml: iner: unknown key; allowed here: inner, names"),
+        ({"inner": {"size": "2"}}, r"m.yaml: inner.size: .*integer.* \(found '2'\)"),
+        ({"inner": {"size": 2.5}}, "m.yaml: inner.size"),
+        ({"names": "abc"}, "m.yaml: names"),
+        ([1, 2], r"m.yaml: \(top level\)"),
+        ({"inner": {"ratio": float("nan")}}, "m.yaml"),
+    ],
+)
+def test_a_fault_names_file_place_and_value(value, message):
+    with pytest.raises(ConfigError, match=message):
+        parse_config(Outer, value, path="m.yaml")
+
+
+def test_lists_become_tuples_and_integers_floats():
+    config = parse_config(Outer, {"names": ["a", "b"], "inner": {"ratio": 1}})
+    assert config == Outer(names=("a", "b"), inner=Inner(ratio=1.0))
+
+
+def test_yaml_that_would_build_objects_is_refused(tmp_path):
+    path = tmp_path / "evil.yaml"
+    path.write_text("!!python/object/apply:os.system ['true']")
+    with pytest.raises(ConfigError, match=r"evil\.yaml: is not valid YAML"):
+        load_yaml(path)
+    path.write_text("a: [1, 2")
+    with pytest.raises(ConfigError, match=r"evil\.yaml: is not valid YAML"):
+        load_yaml(path)

@@ -1,0 +1,72 @@
+"""The floors of the house: a module imports from lower floors only, and some packages live on one floor alone."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import semgrid_eval
+
+ROOT = Path(semgrid_eval.__file__).parent
+FLOORS = ["ground", "frames", "log", "grids", "sequences", "models", "scores", "runs", "report", "cli"]
+ALLOWED_IN = {
+    "mcap": {"log"},
+    "google": {"log"},
+    "foxglove_schemas_protobuf": {"log"},
+    "torch": {"segmentation", "sequences", "models", "scores", "runs"},
+    "click": {"cli"},
+    "rich": {"cli"},
+    "ray": {"runs"},
+    "jinja2": {"report"},
+    "matplotlib": {"report"},
+    "sumo": {"frames"},
+    "trimesh": {"frames"},
+}
+
+
+def modules() -> Iterator[tuple[str, Path]]:
+    for path in sorted(ROOT.rglob("*.py")):
+        if "_pb2" not in path.name:
+            yield floor_of(path.relative_to(ROOT).with_suffix("").parts), path
+
+
+def floor_of(parts: tuple[str, ...]) -> str:
+    return parts[0] if parts and parts[0] in FLOORS else "ground"
+
+
+def imports(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_modules_import_from_lower_floors_only():
+    climbs = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for floor, path in modules()
+        for name in imports(path)
+        if name.startswith("semgrid_eval.") and FLOORS.index(floor_of(tuple(name.split(".")[1:]))) > FLOORS.index(floor)
+    ]
+    assert climbs == []
+
+
+def test_packages_stay_on_their_floor():
+    strays = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for floor, path in modules()
+        for name in imports(path)
+        if floor not in ALLOWED_IN.get(name.split(".")[0], {floor})
+    ]
+    assert strays == []
+
+
+def test_report_reads_files_and_needs_neither_torch_nor_runs():
+    forbidden = ("torch", "semgrid_eval.runs", "semgrid_eval.models", "semgrid_eval.sequences")
+    allowed = ("semgrid_eval.scores.results", "semgrid_eval.scores.iou", "semgrid_eval.scores.statistics")
+    for floor, path in modules():
+        if floor == "report":
+            for name in imports(path):
+                assert not name.startswith(forbidden), f"{path.name} imports {name}"
+                assert not name.startswith("semgrid_eval.scores") or name.startswith(allowed), name
