@@ -1,0 +1,149 @@
+"""PNG files as bytes: read headers, decode gray and palette pictures, give label images colours without decoding."""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple, cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.errors import InputError
+
+MAX_SIDE_PX = 16_384
+GRAY, COLOUR, PALETTE = 0, 2, 3
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_HEADER = struct.Struct(">IIBBBBB")
+_CHUNK_OVERHEAD_BYTES = 12  # length, type and CRC
+_COLOUR_TYPES = {0: "gray", 2: "colour", 3: "palette", 4: "gray with alpha", 6: "colour with alpha"}
+
+
+class PngHeader(NamedTuple):
+    """What a PNG file says of its picture; `colour_type` as in the PNG specification (0 gray, 2 RGB, 3 palette)."""
+
+    width: int
+    height: int
+    bit_depth: int
+    colour_type: int
+
+    def __str__(self) -> str:
+        kind = _COLOUR_TYPES.get(self.colour_type, f"colour type {self.colour_type}")
+        return f"{self.width} x {self.height}, {self.bit_depth} bit, {kind}"
+
+
+class _Chunk(NamedTuple):
+    kind: bytes
+    start: int  # of the whole chunk, its length field included
+    end: int
+
+
+def read_header(data: bytes, path: Path | None = None) -> PngHeader:
+    """Read the header of a PNG file and make sure that the file is whole.
+
+    Args:
+        data: the whole file.
+        path: where it comes from, for error messages.
+
+    Raises:
+        InputError: it is no PNG file, a chunk's checksum is wrong, its end is missing, or its size is out of bounds.
+    """
+    chunks = list(_chunks(data, path))
+    kinds = [chunk.kind for chunk in chunks]
+    if kinds[:1] != [b"IHDR"] or chunks[0].end - chunks[0].start != _HEADER.size + _CHUNK_OVERHEAD_BYTES:
+        raise InputError("is no PNG file: it does not begin with a header", path=path)
+    if kinds[-1] != b"IEND" or b"IDAT" not in kinds:
+        raise InputError("is a damaged PNG file: it ends early", path=path)
+    header = PngHeader(*_HEADER.unpack_from(data, chunks[0].start + 8)[:4])
+    if not (0 < header.width <= MAX_SIDE_PX and 0 < header.height <= MAX_SIDE_PX):
+        raise InputError(f"is {header}; sides of 1 to {MAX_SIDE_PX} pixels are allowed", path=path)
+    return header
+
+
+def decode_gray(data: bytes, *, bit_depth: int, path: Path | None = None) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Decode a gray picture, or the indices of a palette picture, exactly: (H, W) uint8 or uint16.
+
+    Args:
+        data: the whole file.
+        bit_depth: 8 or 16; another depth is an error.
+        path: where it comes from, for error messages.
+
+    Raises:
+        InputError: the file is damaged, of another bit depth, or not gray.
+    """
+    header = read_header(data, path)
+    if header.bit_depth != bit_depth or header.colour_type not in (GRAY, PALETTE):
+        raise InputError(f"is {header}; {bit_depth} bit gray is needed", path=path)
+    if header.colour_type == PALETTE:
+        data = _without_palette(data)  # OpenCV would give colours instead of indices
+    try:
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
+        raise InputError(f"is a damaged PNG file: {error.err}", path=path) from error
+    if picture is None or picture.dtype.itemsize * 8 != bit_depth or picture.shape != (header.height, header.width):
+        raise InputError("is a damaged PNG file: its pixels cannot be decoded", path=path)
+    return cast("NDArray[np.uint8] | NDArray[np.uint16]", picture)
+
+
+def encode_gray(picture: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    """Encode a picture (H, W), uint8 or uint16, as a gray PNG file."""
+    assert picture.ndim == 2
+    assert picture.dtype in (np.uint8, np.uint16)
+    done, data = cv2.imencode(".png", picture)
+    assert done
+    return data.tobytes()
+
+
+def with_palette(data: bytes, palette: NDArray[np.uint8], path: Path | None = None) -> bytes:
+    """Turn an 8-bit gray PNG file into a palette file of the same pixel values, whose compressed pixels are untouched.
+
+    Args:
+        data: the whole file; an 8-bit palette file gets the new palette.
+        palette: sRGB colours (256, 3).
+        path: where it comes from, for error messages.
+
+    Raises:
+        InputError: the file is damaged, not 8 bit or not gray.
+    """
+    header = read_header(data, path)
+    if header.bit_depth != 8 or header.colour_type not in (GRAY, PALETTE):
+        raise InputError(f"is {header}; 8 bit gray is needed", path=path)
+    return _rewrite(data, PALETTE, _pack(b"PLTE", palette.tobytes()))
+
+
+def _without_palette(data: bytes) -> bytes:
+    return _rewrite(data, GRAY, b"")
+
+
+def _rewrite(data: bytes, colour_type: int, after_header: bytes) -> bytes:
+    """Keep size and pixels of a PNG file, drop all else, set its colour type and put chunks after its header."""
+    chunks = list(_chunks(data, None))
+    fields = bytearray(data[chunks[0].start + 8 : chunks[0].end - 4])
+    fields[9] = colour_type
+    kept = b"".join(data[chunk.start : chunk.end] for chunk in chunks if chunk.kind in (b"IDAT", b"IEND"))
+    return _SIGNATURE + _pack(b"IHDR", bytes(fields)) + after_header + kept
+
+
+def _pack(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+def _chunks(data: bytes, path: Path | None) -> Iterator[_Chunk]:
+    """Walk over the chunks up to IEND, holding each one's checksum against its bytes."""
+    if not data.startswith(_SIGNATURE):
+        raise InputError("is no PNG file", path=path)
+    view = memoryview(data)
+    start = len(_SIGNATURE)
+    kind = b""
+    while kind != b"IEND":
+        if start + _CHUNK_OVERHEAD_BYTES > len(data):
+            raise InputError("is a damaged PNG file: it ends early", path=path)
+        end = start + _CHUNK_OVERHEAD_BYTES + int.from_bytes(view[start : start + 4], "big")
+        if end > len(data):
+            raise InputError("is a damaged PNG file: it ends early", path=path)
+        kind = bytes(view[start + 4 : start + 8])
+        if zlib.crc32(view[start + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
+            raise InputError("is a damaged PNG file: a checksum is wrong", path=path)
+        yield _Chunk(kind, start, end)
+        start = end

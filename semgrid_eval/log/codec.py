@@ -1,0 +1,205 @@
+"""Frames, motion and truth as the messages of a log, and back."""
+
+import math
+
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration as CalibrationMessage
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.Pose_pb2 import Pose as PoseMessage
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from semgrid_eval.frames.types import Actor, CameraCalibration, MotionSample, Pose
+from semgrid_eval.log.schemas.actors_pb2 import Actor as ActorMessage
+from semgrid_eval.log.schemas.actors_pb2 import Actors
+from semgrid_eval.log.schemas.egomotion_pb2 import Egomotion
+from semgrid_eval.log.schemas.stereo_calibration_pb2 import CameraExtrinsics, StereoCalibration
+from semgrid_eval.log.topics import BASE_FRAME, GRID_FRAME, MAP_FRAME, ODOM_FRAME, optical_frame
+
+_NS_PER_S = 1_000_000_000
+_GPS_FIELDS = ("latitude_deg", "longitude_deg", "heading_deg")
+_INTRINSICS = ("fx_px", "fy_px", "u0_px", "v0_px")
+_EXTRINSICS = ("x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad")
+_ACTOR_FIELDS = tuple(Actor.__dataclass_fields__)
+
+
+def timestamp(stamp_ns: int) -> Timestamp:
+    """Write integer nanoseconds as seconds and nanoseconds."""
+    return Timestamp(seconds=stamp_ns // _NS_PER_S, nanos=stamp_ns % _NS_PER_S)
+
+
+def stamp_ns(message_timestamp: Timestamp) -> int:
+    """Read seconds and nanoseconds as integer nanoseconds."""
+    return message_timestamp.seconds * _NS_PER_S + message_timestamp.nanos
+
+
+def image_message(stamp_ns: int, camera: str, png: bytes) -> CompressedImage:
+    """Wrap a PNG file of a camera."""
+    return CompressedImage(timestamp=timestamp(stamp_ns), frame_id=optical_frame(camera), data=png, format="png")
+
+
+def calibration_messages(
+    stamp_ns: int, camera: str, calibration: CameraCalibration, size_px: tuple[int, int]
+) -> tuple[CalibrationMessage, StereoCalibration]:
+    """Split a calibration into what viewers know, for pictures of a size (width, height), and what they do not."""
+    fx, fy, u0, v0 = (getattr(calibration, name) for name in _INTRINSICS)
+    width, height = size_px
+    known = CalibrationMessage(
+        timestamp=timestamp(stamp_ns),
+        frame_id=optical_frame(camera),
+        width=width,
+        height=height,
+        distortion_model="plumb_bob",  # pictures are rectified, so all five coefficients are zero
+        D=[0.0] * 5,
+        K=[fx, 0.0, u0, 0.0, fy, v0, 0.0, 0.0, 1.0],
+        R=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        P=[fx, 0.0, u0, 0.0, 0.0, fy, v0, 0.0, 0.0, 0.0, 1.0, 0.0],
+    )
+    rest = StereoCalibration(
+        timestamp=timestamp(stamp_ns),
+        frame_id=optical_frame(camera),
+        parent_frame_id=BASE_FRAME,
+        baseline_m=calibration.baseline_m,
+        extrinsics=CameraExtrinsics(**{name: getattr(calibration, name) for name in _EXTRINSICS}),
+    )
+    return known, rest
+
+
+def read_calibration(known: bytes, rest: bytes) -> CameraCalibration:
+    """Join the two messages of `calibration_messages`.
+
+    Raises:
+        DecodeError: a message is damaged.
+        ValueError: the camera matrix is incomplete.
+        InputError: a value is impossible; the message names the field.
+    """
+    camera, stereo = CalibrationMessage.FromString(known), StereoCalibration.FromString(rest)
+    if len(camera.K) != 9:
+        raise ValueError(f"a camera matrix has {len(camera.K)} values")
+    return CameraCalibration(
+        **dict(zip(_INTRINSICS, (camera.K[0], camera.K[4], camera.K[2], camera.K[5]), strict=True)),
+        baseline_m=stereo.baseline_m,
+        **{name: getattr(stereo.extrinsics, name) for name in _EXTRINSICS},
+    )
+
+
+def motion_message(sample: MotionSample) -> Egomotion:
+    """Write what the vehicle reports of its motion."""
+    gps = {name: getattr(sample, name) for name in _GPS_FIELDS if getattr(sample, name) is not None}
+    return Egomotion(
+        timestamp=timestamp(sample.stamp_ns),
+        frame_id=BASE_FRAME,
+        speed_mps=sample.speed_mps,
+        yaw_rate_radps=sample.yaw_rate_radps,
+        **gps,
+    )
+
+
+def read_motion(data: bytes) -> MotionSample:
+    """Read what the vehicle reported of its motion.
+
+    Raises:
+        DecodeError: the message is damaged.
+    """
+    message = Egomotion.FromString(data)
+    gps = {name: getattr(message, name) for name in _GPS_FIELDS if message.HasField(name)}
+    return MotionSample(stamp_ns(message.timestamp), message.speed_mps, message.yaw_rate_radps, **gps)
+
+
+def pose_message(pose: Pose, frame_id: str) -> PoseInFrame:
+    """Write a planar pose in a frame."""
+    return PoseInFrame(
+        timestamp=timestamp(pose.stamp_ns),
+        frame_id=frame_id,
+        pose=PoseMessage(position=Vector3(x=pose.x_m, y=pose.y_m, z=0.0), orientation=_turned_by(pose.yaw_rad)),
+    )
+
+
+def read_pose(data: bytes) -> Pose:
+    """Read a planar pose; its yaw comes back within rounding, between minus and plus pi.
+
+    Raises:
+        DecodeError: the message is damaged.
+    """
+    message = PoseInFrame.FromString(data)
+    position, turn = message.pose.position, message.pose.orientation
+    yaw_rad = math.remainder(2 * math.atan2(turn.z, turn.w), 2 * math.pi)
+    return Pose(stamp_ns(message.timestamp), position.x, position.y, yaw_rad)
+
+
+def actors_message(stamp_ns: int, actors: tuple[Actor, ...]) -> Actors:
+    """Write the true boxes of all actors at one time."""
+    boxes = [ActorMessage(**{name: getattr(actor, name) for name in _ACTOR_FIELDS}) for actor in actors]
+    return Actors(timestamp=timestamp(stamp_ns), frame_id=MAP_FRAME, actors=boxes)
+
+
+def read_actors(data: bytes) -> tuple[int, tuple[Actor, ...]]:
+    """Read the true boxes of all actors and their time.
+
+    Raises:
+        DecodeError: the message is damaged.
+    """
+    message = Actors.FromString(data)
+    boxes = (Actor(**{name: getattr(actor, name) for name in _ACTOR_FIELDS}) for actor in message.actors)
+    return stamp_ns(message.timestamp), tuple(boxes)
+
+
+def transforms_message(pose: Pose, calibrations: dict[str, CameraCalibration]) -> FrameTransforms:
+    """Write where vehicle, grid and cameras are when the vehicle stands at `pose` in the odom frame."""
+    position = (pose.x_m, pose.y_m, 0.0)
+    time = timestamp(pose.stamp_ns)
+    transforms = [
+        _transform(time, ODOM_FRAME, BASE_FRAME, position, _turned_by(pose.yaw_rad)),
+        _transform(time, ODOM_FRAME, GRID_FRAME, position, _turned_by(0.0)),
+    ]
+    for camera, calibration in sorted(calibrations.items()):
+        place = (calibration.x_m, calibration.y_m, calibration.z_m)
+        transforms.append(
+            _transform(time, BASE_FRAME, optical_frame(camera), place, _ego_from_optical_rotation(calibration))
+        )
+    return FrameTransforms(transforms=transforms)
+
+
+def _transform(
+    time: Timestamp, parent: str, child: str, position: tuple[float, float, float], rotation: Quaternion
+) -> FrameTransform:
+    x, y, z = position
+    translation = Vector3(x=x, y=y, z=z)
+    return FrameTransform(
+        timestamp=time, parent_frame_id=parent, child_frame_id=child, translation=translation, rotation=rotation
+    )
+
+
+def _turned_by(yaw_rad: float) -> Quaternion:
+    return Quaternion(x=0.0, y=0.0, z=math.sin(yaw_rad / 2), w=math.cos(yaw_rad / 2))
+
+
+def _ego_from_optical_rotation(calibration: CameraCalibration) -> Quaternion:
+    """Turn optical axes (right, down, forward) into camera axes (forward, left, up), then by roll, pitch and yaw."""
+    result = _product(_about(2, calibration.yaw_rad), _about(1, calibration.pitch_rad))
+    result = _product(result, _about(0, calibration.roll_rad))
+    x, y, z, w = _product(result, (-0.5, 0.5, -0.5, 0.5))
+    return Quaternion(x=x, y=y, z=z, w=w)
+
+
+_Quaternion = tuple[float, float, float, float]
+
+
+def _about(axis: int, angle_rad: float) -> _Quaternion:
+    x, y, z = (math.sin(angle_rad / 2) if axis == i else 0.0 for i in range(3))
+    return x, y, z, math.cos(angle_rad / 2)
+
+
+def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
+    """Multiply quaternions (x, y, z, w): the rotation by `b`, then by `a`."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )

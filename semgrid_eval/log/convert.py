@@ -1,0 +1,144 @@
+"""Convert recordings to logs, several at once: what is done is skipped, what fails is named, the rest goes on."""
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from semgrid_eval.errors import InputError, LogError, SemgridError
+from semgrid_eval.frames.types import Recording
+from semgrid_eval.log.store import SUFFIX, LogReader, write_log
+from semgrid_eval.progress import Progress
+
+
+@dataclass(frozen=True)
+class ConversionJob:
+    """One recording to convert; it travels to another process, so `digest` and `load` must be picklable.
+
+    Args:
+        name: of the recording, a valid file name without suffix.
+        split: the folder its log goes to.
+        digest: digest of everything that determines the content, or what computes it (in the other process).
+        load: gives the recording.
+    """
+
+    name: str
+    split: str
+    digest: str | Callable[[], str]
+    load: Callable[[], Recording]
+
+    @property
+    def label(self) -> str:
+        """Split and name, which nothing else in a conversion shares."""
+        return f"{self.split}/{self.name}"
+
+
+@dataclass
+class ConversionSummary:
+    """What became of each recording, by split and name (`val/aachen_000000_000000`), sorted."""
+
+    written: list[str] = field(default_factory=list)
+    skipped: list[str] = field(default_factory=list)
+    failed: dict[str, str] = field(default_factory=dict)
+
+
+def convert_recordings(
+    jobs: Sequence[ConversionJob], out: Path, *, workers: int, progress: Progress
+) -> ConversionSummary:
+    """Write the log OUT/<split>/<name>.mcap of each recording.
+
+    A log that is whole and was made from inputs of the same digest is left as it is. A recording that fails, because
+    its source is at fault, is named in the summary with its reason.
+
+    Args:
+        jobs: the recordings.
+        out: the folder of all logs.
+        workers: how many processes convert at once; 1 converts in this one.
+        progress: told after each recording.
+
+    Raises:
+        InputError: two recordings have one name.
+    """
+    _refuse_duplicates(jobs)
+    summary = ConversionSummary()
+    for done, (job, outcome) in enumerate(_outcomes(jobs, out, workers), start=1):
+        if outcome.failure is not None:
+            summary.failed[job.label] = outcome.failure
+        else:
+            (summary.written if outcome.written else summary.skipped).append(job.label)
+        progress(done, len(jobs), job.label)
+    summary.written.sort()
+    summary.skipped.sort()
+    summary.failed = dict(sorted(summary.failed.items()))
+    return summary
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    written: bool
+    failure: str | None = None
+
+
+def _outcomes(jobs: Sequence[ConversionJob], out: Path, workers: int) -> Iterator[tuple[ConversionJob, _Outcome]]:
+    if min(workers, len(jobs)) <= 1:
+        for job in jobs:
+            yield job, _convert(job, out)
+        return
+    # Fresh processes: a fork would copy whatever threads and locks the caller holds.
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context, initializer=_ignore_interrupt)
+    try:
+        futures = {pool.submit(_convert, job, out): job for job in jobs}
+        for future in as_completed(futures):
+            yield futures[future], _result(future)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _result(future: Future[_Outcome]) -> _Outcome:
+    try:
+        return future.result()
+    except BrokenProcessPool:
+        return _Outcome(written=False, failure="a worker process was killed (out of memory?)")
+
+
+def _convert(job: ConversionJob, out: Path) -> _Outcome:
+    path = out / job.split / f"{job.name}{SUFFIX}"
+    try:
+        digest = job.digest if isinstance(job.digest, str) else job.digest()
+        if _is_current(path, digest):
+            return _Outcome(written=False)
+        write_log(job.load(), path)
+    except SemgridError as error:
+        return _Outcome(written=False, failure=str(error))
+    return _Outcome(written=True)
+
+
+def _is_current(path: Path, digest: str) -> bool:
+    """Whether the log is there, whole and made from inputs of this digest."""
+    if not path.exists():
+        return False
+    try:
+        with LogReader(path) as log:
+            if log.scene.source_digest != digest:
+                return False
+            log.verify()
+    except LogError:
+        return False
+    return True
+
+
+def _refuse_duplicates(jobs: Sequence[ConversionJob]) -> None:
+    seen: set[str] = set()
+    for job in jobs:
+        if job.label in seen:
+            raise InputError("two recordings have this name", field=job.label)
+        seen.add(job.label)
+
+
+def _ignore_interrupt() -> None:
+    """Let Ctrl-C stop the parent alone: it drops what waits, and what is being written is finished."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,65 @@
+"""What a log says of itself as a whole, kept in its metadata record `semgrid.scene`."""
+
+import json
+from dataclasses import dataclass
+
+from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.files import digest_value
+
+RECORD = "semgrid.scene"
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A log's name, origin and cameras.
+
+    Args:
+        name: unique in its data set.
+        dataset: where the recording comes from: `cityscapes` or `synthetic`.
+        split: `train`, `val` or `test`.
+        cameras: their names, sorted.
+        source_digest: digest of everything that determined the content.
+        class_names: the grid classes when the log was written.
+    """
+
+    name: str
+    dataset: str
+    split: str
+    cameras: tuple[str, ...]
+    source_digest: str
+    class_names: tuple[str, ...] = CLASS_NAMES
+
+    def to_metadata(self) -> dict[str, str]:
+        """Return the entries of the metadata record, with a digest of their own: MCAP has no checksum for them."""
+        entries = {
+            "format_version": str(FORMAT_VERSION),
+            "name": self.name,
+            "dataset": self.dataset,
+            "split": self.split,
+            "cameras": json.dumps(self.cameras),
+            "source_digest": self.source_digest,
+            "class_names": json.dumps(self.class_names),
+        }
+        return {**entries, "digest": digest_value(entries)}
+
+    @classmethod
+    def from_metadata(cls, entries: dict[str, str]) -> "Scene":
+        """Read the entries of the metadata record.
+
+        Raises:
+            ValueError: they are damaged, incomplete or of another format version.
+        """
+        given = {key: value for key, value in entries.items() if key != "digest"}
+        if entries.get("digest") != digest_value(given):
+            raise ValueError(f"metadata {RECORD} does not match its digest")
+        if given.get("format_version") != str(FORMAT_VERSION):
+            raise ValueError(f"its format version is {given.get('format_version')}; {FORMAT_VERSION} can be read")
+        return cls(
+            name=given["name"],
+            dataset=given["dataset"],
+            split=given["split"],
+            cameras=tuple(json.loads(given["cameras"])),
+            source_digest=given["source_digest"],
+            class_names=tuple(json.loads(given["class_names"])),
+        )
