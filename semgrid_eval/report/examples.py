@@ -1,0 +1,150 @@
+"""Example windows, chosen by a rule: where a model most outperforms its baselines, and where it loses most.
+
+The rule is the supplement's: min(IoU_ED-DC - IoU_BL-DC, IoU_ED-DC - IoU_BL-NT), for one class or over all of them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
+from semgrid_eval.report.cells import signed
+from semgrid_eval.report.comparison import Headline, reference_of
+from semgrid_eval.report.reading import Result, Row
+from semgrid_eval.scores.iou import class_iou
+from semgrid_eval.scores.results import WindowRecord
+
+MIN_CELLS = 10
+"""A class counts in the choice of windows only where the target has at least this many of its cells."""
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Contest:
+    """A model, the baselines that it is measured against, and which seed of it is shown."""
+
+    model: Row
+    rivals: tuple[Row, ...]
+
+    @property
+    def result(self) -> Result:
+        """The result whose predictions are shown: that of the first seed."""
+        return self.model.results[0]
+
+    @property
+    def rule(self) -> str:
+        """The rule of choice in words."""
+        gaps = [f"IoU {self.model.name} \N{MINUS SIGN} IoU {rival.name}" for rival in self.rivals]
+        if not gaps:
+            return f"IoU {self.model.name}"
+        return gaps[0] if len(gaps) == 1 else f"min({', '.join(gaps)})"
+
+
+@dataclass(frozen=True)
+class Pick:
+    """One chosen window: its index in the contest's result, why it was chosen and its score under the rule."""
+
+    index: int
+    reason: str
+    score: float
+
+    def __str__(self) -> str:
+        return f"{self.reason}: {signed(self.score)}"
+
+
+def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
+    """Choose who is measured against whom: ED-DC against BL-DC and BL-NT where they exist, then the other trained rows.
+
+    Without a trained row, the best row is measured against the other baselines; alone, against nobody.
+    """
+    if headline is None:
+        return []
+    main = _row(rows, headline.best, "ED", "DC") or (headline.rival if headline.best.is_baseline else headline.best)
+    main = main or headline.best
+    named = [_row(rows, main, "BL", "DC"), _row(rows, main, "BL", "NT")]
+    rivals = [row for row in named if row is not None and row != main] or _default_rivals(main, rows, headline)
+    others = [(row, reference_of(row, rows)) for row in rows if not row.is_baseline and row != main]
+    found = [Contest(main, tuple(rivals))]
+    return found + [Contest(row, (reference,)) for row, reference in others if reference is not None]
+
+
+def choose(contest: Contest, *, best: int, worst: int) -> list[Pick]:
+    """Choose windows by the mean over classes: the largest values of the rule, then the smallest."""
+    gaps = rule_values(contest)
+    values = _mean_finite(gaps[:, [i for i in range(CLASS_COUNT) if i != UNKNOWN]])
+    order = _ordered(values)
+    top = [Pick(int(i), "mean over classes, largest", float(values[i])) for i in order[:best]]
+    left = order[len(top) :][::-1]
+    return top + [Pick(int(i), "mean over classes, smallest", float(values[i])) for i in left[:worst]]
+
+
+def choose_by_class(contest: Contest) -> list[Pick]:
+    """Choose, for each class but `unknown`, the window with the largest and the one with the smallest value."""
+    gaps, picks = rule_values(contest), []
+    for index, name in enumerate(CLASS_NAMES):
+        order = _ordered(gaps[:, index]) if index != UNKNOWN else np.zeros(0, np.intp)
+        ends = [(order[0], "largest"), (order[-1], "smallest")] if len(order) > 1 else [(i, "only") for i in order]
+        label = name.replace("_", " ")
+        picks += [Pick(int(i), f"{label}, {end}", float(gaps[i, index])) for i, end in ends]
+    return picks
+
+
+def rule_values(contest: Contest) -> Array:
+    """Evaluate the rule for each window and class: (N, C); NaN where there is too little of the class."""
+    counts = contest.result.counts
+    mine = class_iou(counts.astype(np.int64))
+    few = counts.sum(axis=2) < MIN_CELLS
+    gaps = [mine - _aligned_iou(contest.result, rival.results[0]) for rival in contest.rivals] or [mine]
+    value = gaps[0]
+    for gap in gaps[1:]:
+        value = np.minimum(value, gap)
+    return np.where(few, np.nan, value)
+
+
+def key_of(window: WindowRecord) -> tuple[str, int]:
+    """Identify the target frame of a window across rows."""
+    return window.recording, window.target_stamp_ns
+
+
+def positions(result: Result) -> Mapping[tuple[str, int], int]:
+    """Index a result's windows by their target frame."""
+    return {key_of(window): i for i, window in enumerate(result.record.windows)}
+
+
+def _aligned_iou(result: Result, other: Result) -> Array:
+    """IoU of another result's windows in the order of `result`; NaN where it has no such window."""
+    theirs = class_iou(other.counts.astype(np.int64))
+    at = positions(other)
+    places = np.array([at.get(key_of(window), -1) for window in result.record.windows], np.intp)
+    padded = np.vstack([theirs, np.full((1, CLASS_COUNT), np.nan)])
+    return np.asarray(padded[places])
+
+
+def _row(rows: Sequence[Row], like: Row, model: str, experiment: str) -> Row | None:
+    wanted = f"{model}-{experiment}"
+    return next((row for row in rows if row.record.name == wanted and row.run == like.run), None)
+
+
+def _default_rivals(main: Row, rows: Sequence[Row], headline: Headline) -> list[Row]:
+    reference = reference_of(main, rows)
+    if reference is not None:
+        return [reference]
+    return [row for row in (headline.best, headline.rival) if row is not None and row != main][:1] or [
+        row for row in rows if row != main and row.run == main.run and row.is_baseline
+    ][:1]
+
+
+def _ordered(values: Array) -> NDArray[np.intp]:
+    """Order the windows that have a value, largest first, ties in the order of the windows."""
+    order = np.argsort(-values, kind="stable")
+    return order[np.isfinite(values[order])]
+
+
+def _mean_finite(values: Array) -> Array:
+    present = np.isfinite(values)
+    number = present.sum(axis=1)
+    total = np.where(present, values, 0.0).sum(axis=1)
+    return np.asarray(np.divide(total, number, out=np.full(len(values), np.nan), where=number > 0))

@@ -1,0 +1,129 @@
+"""The report's files beside the page: long-form CSV, tables for papers, figures and one JSON for machines."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from semgrid_eval import __version__
+from semgrid_eval.files import write_json, write_text
+from semgrid_eval.report.cells import ABSENT
+from semgrid_eval.report.comparison import reference_of
+from semgrid_eval.report.estimates import CATEGORY_COLUMNS, COLUMNS, DRAWS, LEVEL, Estimate, RowScores
+from semgrid_eval.report.longform import category_table, class_table
+from semgrid_eval.report.plots import Plot
+from semgrid_eval.report.provenance import failures
+from semgrid_eval.report.reading import Run
+from semgrid_eval.report.tables import LABELS
+
+RECORD = "report.json"
+FORMAT_VERSION = 1
+_LATEX = str.maketrans(
+    {
+        **{character: f"\\{character}" for character in "&%$#_{}"},
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "\\": r"\textbackslash{}",
+    }
+)
+
+Scores = Mapping[str, RowScores]
+
+
+def write_tables(folder: Path, runs: Sequence[Run], scores: Scores) -> None:
+    """Write classes.csv, categories.csv, summary.csv, summary.md, summary.tex and report.json."""
+    entries = list(scores.values())
+    _write_csv(folder / "classes.csv", class_table(entries))
+    _write_csv(folder / "categories.csv", category_table(entries))
+    _write_csv(folder / "summary.csv", summary_table(scores))
+    write_text(folder / "summary.md", markdown_table(scores))
+    write_text(folder / "summary.tex", latex_table(scores))
+    write_json(folder / RECORD, report_record(runs, scores))
+
+
+def write_figures(folder: Path, figures: Mapping[str, Sequence[Plot]]) -> None:
+    """Write each figure as PNG and SVG."""
+    (folder / "figures").mkdir()
+    for plot in (plot for group in figures.values() for plot in group):
+        (folder / "figures" / f"{plot.name}.png").write_bytes(plot.png)
+        (folder / "figures" / f"{plot.name}.svg").write_text(plot.svg, encoding="utf-8")
+
+
+def summary_table(scores: Scores) -> pd.DataFrame:
+    """Return one line for each row and column of scores: row, column, iou, low, high, seeds, windows."""
+    lines = [
+        (name, column, *_numbers(entry.estimate(column)), len(entry.row.results), entry.row.windows)
+        for name, entry in scores.items()
+        for column in COLUMNS
+    ]
+    return pd.DataFrame(lines, columns=["row", "score", "iou", "low", "high", "seeds", "windows"])
+
+
+def markdown_table(scores: Scores) -> str:
+    """Write the category scores as a Markdown table."""
+    lines = [["Row", *(LABELS[column] for column in CATEGORY_COLUMNS)], ["---"] + ["---:"] * len(CATEGORY_COLUMNS)]
+    lines += [[_markdown(name), *_texts(entry)] for name, entry in scores.items()]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def latex_table(scores: Scores) -> str:
+    """Write the category scores as a LaTeX table (package booktabs)."""
+    heads = " & ".join(["Row", *(LABELS[column] for column in CATEGORY_COLUMNS)])
+    lines = [r"\begin{tabular}{l" + "r" * len(CATEGORY_COLUMNS) + "}", r"\toprule", heads + r" \\", r"\midrule"]
+    lines += [" & ".join([name.translate(_LATEX), *_texts(entry)]) + r" \\" for name, entry in scores.items()]
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""]).replace(ABSENT, "--")
+
+
+def report_record(runs: Sequence[Run], scores: Scores) -> dict[str, Any]:
+    """Return everything a machine may want to know of a report; absent values are null."""
+    rows = [entry.row for entry in scores.values()]
+    return {
+        "format_version": FORMAT_VERSION,
+        "semgrid_eval": __version__,
+        "interval": {"level": LEVEL, "draws": DRAWS, "over": "recordings, and seeds where there are several"},
+        "runs": [
+            {"tag": run.tag, "record": run.record.model_dump(mode="json", exclude={"rows": {"__all__": {"results"}}})}
+            for run in runs
+        ],
+        "failures": [vars(failure) for failure in failures(runs)],
+        "rows": {name: _row_record(entry, scores, rows) for name, entry in scores.items()},
+    }
+
+
+def _row_record(entry: RowScores, scores: Scores, rows: Sequence[Any]) -> dict[str, Any]:
+    reference = reference_of(entry.row, rows)
+    other = None if reference is None else scores[reference.name]
+    return {
+        "experiment": entry.row.record.experiment,
+        "model": entry.row.record.model,
+        "results": [result.record.id for result in entry.row.results],
+        "seeds": [result.record.seed for result in entry.row.results],
+        "windows": entry.row.windows,
+        "scores": {column: _json(entry.estimate(column)) for column in COLUMNS},
+        "reference": None if reference is None else reference.name,
+        "differences": {} if other is None else {column: _json(entry.minus(other, column)) for column in COLUMNS},
+    }
+
+
+def _json(estimate: Estimate) -> dict[str, float | None]:
+    values = dict(zip(("value", "low", "high"), _numbers(estimate), strict=True))
+    return {name: value if np.isfinite(value) else None for name, value in values.items()}
+
+
+def _numbers(estimate: Estimate) -> tuple[float, float, float]:
+    return estimate.value, estimate.low, estimate.high
+
+
+def _texts(entry: RowScores) -> list[str]:
+    return [f"{entry.mean[c]:.3f}" if np.isfinite(entry.mean[c]) else ABSENT for c in CATEGORY_COLUMNS]
+
+
+def _markdown(text: str) -> str:
+    escaped = "".join(f"\\{character}" if character in "\\`*_{}[]<>#|!" else character for character in text)
+    return " ".join(escaped.split())
+
+
+def _write_csv(path: Path, table: pd.DataFrame) -> None:
+    write_text(path, table.to_csv(index=False, float_format="%.6f", lineterminator="\n"))

@@ -1,0 +1,148 @@
+"""Writes a report: one self-contained page, tables for people and for machines, and figures."""
+
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from semgrid_eval import __version__
+from semgrid_eval.errors import InputError
+from semgrid_eval.files import atomic_folder
+from semgrid_eval.progress import Progress, silent
+from semgrid_eval.report import exports, plots, provenance, tables
+from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, Headline, headline
+from semgrid_eval.report.estimates import RowScores, score_rows
+from semgrid_eval.report.examples import Contest, choose, choose_by_class, contests
+from semgrid_eval.report.panels import Example, example_windows
+from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
+from semgrid_eval.report.reading import Row, Run, load_runs
+from semgrid_eval.report.summary import summarise
+
+PAGE = "index.html"
+_SEED = 20190623
+_BEST, _WORST, _OTHER = 3, 3, 1
+
+Scores = Mapping[str, RowScores]
+
+
+def write_report(run: Path | Sequence[Path], out: Path | None = None, *, progress: Progress = silent) -> Path:
+    """Write the report of one run, or of several side by side, and return its page.
+
+    Args:
+        run: the folder of a run, or several.
+        out: the folder to write; `report` in the (first) run where it is not given. A report there is replaced.
+        progress: told of each row read.
+
+    Raises:
+        InputError: a run's record cannot be read, or `out` holds something other than a report.
+    """
+    folders = [run] if isinstance(run, Path) else list(run)
+    if not folders:
+        raise InputError("no run is given", field="run")
+    out = folders[0] / "report" if out is None else out
+    _check_replaceable(out)
+    runs = load_runs(folders, progress=progress)
+    rows = [row for each in runs for row in each.rows]
+    scores = score_rows(rows, np.random.default_rng(_SEED))
+    figures = draw_figures(scores, rows)
+    with atomic_folder(out) as folder:
+        exports.write_tables(folder, runs, scores)
+        exports.write_figures(folder, figures)
+        (folder / PAGE).write_text(render_page(runs, scores, figures), encoding="utf-8")
+    return out / PAGE
+
+
+def draw_figures(scores: Scores, rows: Sequence[Row]) -> dict[str, list[plots.Plot]]:
+    """Draw all figures by section of the page."""
+    return {
+        "overview": plots.category_overview(scores),
+        "categories": plots.category_plots(scores),
+        "horizon": plots.horizon_plots(scores),
+        "training": plots.training_plots(rows),
+    }
+
+
+def render_page(runs: Sequence[Run], scores: Scores, figures: Mapping[str, Sequence[plots.Plot]]) -> str:
+    """Render the page as HTML that needs nothing but itself."""
+    found = headline(scores)
+    environment = Environment(
+        loader=PackageLoader("semgrid_eval.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["svg_uri"] = lambda text: data_uri(text.encode(), "image/svg+xml")
+    return environment.get_template("page.html.j2").render(
+        style=_source("style.css"),
+        script=_source("page.js"),
+        version=__version__,
+        runs=runs,
+        title=", ".join(each.record.title for each in runs),
+        summary=summarise(runs, scores, found),
+        tables=page_tables(runs, scores),
+        figures=figures,
+        legend=(*CLASS_LEGEND, MASK_LEGEND),
+        right_legend=RIGHT_LEGEND,
+        examples=example_groups([entry.row for entry in scores.values()], found),
+        failures=provenance.failures(runs),
+        logs=provenance.log_table(runs),
+        results=provenance.result_table(runs),
+        facts=[(each, provenance.facts(each)) for each in runs],
+    )
+
+
+def page_tables(runs: Sequence[Run], scores: Scores) -> dict[str, Any]:
+    """Make the page's tables of scores; a table with nothing to show is None."""
+    if not scores:
+        return dict.fromkeys(("categories", "differences", "classes", "merged", "runs", "costs"))
+    return {
+        "categories": tables.category_values(scores),
+        "differences": tables.difference_table("differences", scores, DIFFERENCE_COLUMNS),
+        "classes": tables.class_values(scores),
+        "merged": tables.merged_values(scores),
+        "runs": tables.run_differences(scores, [each.tag for each in runs], DIFFERENCE_COLUMNS),
+        "costs": tables.training_table(list(scores.values())),
+    }
+
+
+def example_groups(rows: Sequence[Row], found: Headline | None) -> list[dict[str, Any]]:
+    """Draw the example windows: the main contest, its classes, and one good and one bad window of the others."""
+    groups = []
+    for index, contest in enumerate(contests(rows, found)):
+        main = index == 0
+        picks = choose(contest, best=_BEST if main else _OTHER, worst=_WORST if main else _OTHER)
+        groups.append(_group(contest, *example_windows(contest, picks), open_=main))
+        if main:
+            groups.append(_group(contest, *example_windows(contest, choose_by_class(contest)), open_=False))
+            groups[-1]["title"] += ", class by class"
+    return groups
+
+
+def _group(contest: Contest, windows: Sequence[Example], problem: str, *, open_: bool) -> dict[str, Any]:
+    against = " and ".join(rival.name for rival in contest.rivals)
+    title = f"{contest.model.name} against {against}" if against else contest.model.name
+    seed = contest.result.record.seed
+    return {
+        "title": title,
+        "rule": contest.rule,
+        "seed": seed,
+        "windows": windows,
+        "problem": problem,
+        "open": open_,
+    }
+
+
+def _check_replaceable(out: Path) -> None:
+    if not out.exists():
+        return
+    if not out.is_dir() or (any(out.iterdir()) and not (out / exports.RECORD).is_file()):
+        raise InputError("exists and is no report; name another folder", path=out, field="out")
+
+
+def _source(name: str) -> Markup:
+    return Markup(resources.files("semgrid_eval.report").joinpath("templates", name).read_text(encoding="utf-8"))

@@ -1,0 +1,121 @@
+"""The pictures of one example window, side by side: inputs, target, predictions, who is right, certainty."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.errors import SemgridError
+from semgrid_eval.report.examples import Contest, Pick, key_of, positions
+from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, certainty_png, data_uri, grid_png, right_png
+from semgrid_eval.report.reading import Result
+from semgrid_eval.scores.results import read_arrays, windows_file
+
+Grid = NDArray[np.uint8]
+
+_EPOCH_FROM_NS = 10**17  # stamps beyond 1973 are dates, smaller ones are times since the start of a log
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One picture: title, what it shows (its alternative text) and the data URI."""
+
+    title: str
+    alt: str
+    uri: str
+
+
+@dataclass(frozen=True)
+class Example:
+    """One example window, ready to be shown."""
+
+    title: str
+    recording: str
+    log: str
+    frame: int
+    time: str
+    pictures: tuple[Picture, ...]
+    legend: tuple[tuple[str, str], ...]
+
+
+def example_windows(contest: Contest, picks: Sequence[Pick]) -> tuple[list[Example], str]:
+    """Draw the chosen windows of a contest, and say in words where their arrays cannot be read."""
+    if not picks:
+        return [], ""
+    try:
+        return list(_draw(contest, picks)), ""
+    except (SemgridError, ValueError, IndexError) as error:
+        return [], f"The pictures of {contest.model.name} cannot be shown: {error}"
+
+
+def shown_time(stamp_ns: int) -> str:
+    """Write a time stamp: a date where it is one, else seconds."""
+    if stamp_ns < _EPOCH_FROM_NS:
+        return f"{stamp_ns / 1e9:.3f} s"
+    return f"{datetime.fromtimestamp(stamp_ns // 10**9, UTC):%Y-%m-%d %H:%M:%S}.{stamp_ns % 10**9 // 10**6:03d} UTC"
+
+
+def _draw(contest: Contest, picks: Sequence[Pick]) -> Iterator[Example]:
+    result, at = contest.result, [pick.index for pick in picks]
+    path = windows_file(contest.model.run, result.record.windows_id)
+    shown = _read(path, ("inputs", "target", "mask"), at)
+    mine = _read(result.folder / "predictions.npz", ("prediction", "certainty"), at)
+    rivals = {rival.name: _rival_predictions(result, rival.results[0], at) for rival in contest.rivals}
+    for i, pick in enumerate(picks):
+        window = result.record.windows[pick.index]
+        grids = {name: array[i] for name, array in (shown | mine).items()}
+        theirs = {name: grid for name, grids_of in rivals.items() if (grid := grids_of[i]) is not None}
+        pictures = tuple(_pictures(contest, grids, theirs))
+        time = shown_time(window.target_stamp_ns)
+        yield Example(
+            str(pick), window.recording, window.log, window.target_frame, time, pictures, _legend(grids, theirs)
+        )
+
+
+def _pictures(contest: Contest, grids: dict[str, NDArray[np.generic]], rivals: dict[str, Grid]) -> Iterable[Picture]:
+    inputs = np.asarray(grids["inputs"], np.uint8)
+    target, prediction = np.asarray(grids["target"], np.uint8), np.asarray(grids["prediction"], np.uint8)
+    mask = np.asarray(grids["mask"], np.bool_)
+    sensors, steps = inputs.shape[:2]
+    for t in range(steps):
+        for s in range(sensors):
+            title = f"Input {t + 1} of {steps}" + (f", {_sensor(contest, s)}" if sensors > 1 else "")
+            yield Picture(title, f"{title}, aligned to the target", data_uri(grid_png(inputs[s, t])))
+    yield Picture("Target", "Target grid with mask M in white", data_uri(grid_png(target, mask)))
+    name = contest.model.name
+    yield Picture(name, f"Prediction of {name}", data_uri(grid_png(prediction)))
+    for rival, grid in rivals.items():
+        yield Picture(rival, f"Prediction of {rival}", data_uri(grid_png(grid)))
+    for rival, grid in list(rivals.items())[:1]:
+        alt = f"Cells where {name} or {rival} is right"
+        yield Picture("Who is right", alt, data_uri(right_png(target, prediction, grid, mask)))
+    certainty = np.asarray(grids["certainty"], np.uint8)
+    yield Picture("Certainty", f"Certainty of {name}, light is certain", data_uri(certainty_png(certainty)))
+
+
+def _legend(grids: dict[str, NDArray[np.generic]], rivals: dict[str, Grid]) -> tuple[tuple[str, str], ...]:
+    """Name the classes that appear in an example, and M."""
+    drawn = [grids["inputs"], grids["target"], grids["prediction"], *rivals.values()]
+    there = np.unique(np.concatenate([np.unique(grid) for grid in drawn]))
+    return (*(CLASS_LEGEND[int(i)] for i in there), MASK_LEGEND)
+
+
+def _sensor(contest: Contest, index: int) -> str:
+    sensors = contest.model.record.sensors
+    return sensors[index] if index < len(sensors) else f"sensor {index + 1}"
+
+
+def _rival_predictions(result: Result, rival: Result, at: Sequence[int]) -> list[Grid | None]:
+    places = positions(rival)
+    found = [places.get(key_of(result.record.windows[i])) for i in at]
+    there = [i for i in found if i is not None]
+    grids = iter(_read(rival.folder / "predictions.npz", ("prediction",), there)["prediction"]) if there else iter(())
+    return [None if i is None else np.asarray(next(grids), np.uint8) for i in found]
+
+
+def _read(path: Path, names: tuple[str, ...], at: Sequence[int]) -> dict[str, NDArray[np.generic]]:
+    arrays = read_arrays(path, names)
+    return {name: array[list(at)] for name, array in arrays.items()}

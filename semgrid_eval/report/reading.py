@@ -1,0 +1,117 @@
+"""Reads a run's result files; what cannot be read becomes a failure of its row, and the rest goes on."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.errors import SemgridError
+from semgrid_eval.progress import Progress, silent
+from semgrid_eval.scores.results import (
+    ResultRecord,
+    RowRecord,
+    RunRecord,
+    read_counts,
+    read_history,
+    read_result,
+    read_run,
+    result_folder,
+)
+
+
+@dataclass(frozen=True)
+class Result:
+    """One readable result: its record, the counts (N, C, C) of its windows and its training history."""
+
+    record: ResultRecord
+    counts: NDArray[np.int32]
+    history: pd.DataFrame | None
+    folder: Path
+
+    @property
+    def seed(self) -> int:
+        """The seed; 0 where the predictor does not depend on chance."""
+        return self.record.seed or 0
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the matrix with its readable results, in the order of seeds, and what went wrong."""
+
+    name: str  # unique in the report: the record's name, with its run's tag where there are several runs
+    record: RowRecord
+    results: tuple[Result, ...]
+    failures: tuple[str, ...]
+    run: Path
+
+    @property
+    def is_baseline(self) -> bool:
+        """Whether the row is one of the model-driven baselines, which need no training."""
+        return self.record.model == "BL" or self.record.model.startswith("BL-")
+
+    @property
+    def windows(self) -> int:
+        """Windows behind the row's scores."""
+        return max((len(result.counts) for result in self.results), default=0)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A whole run as read from disk."""
+
+    folder: Path
+    tag: str  # tells runs apart; empty where there is only one
+    record: RunRecord
+    rows: tuple[Row, ...]
+
+
+def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[Run, ...]:
+    """Read the records of runs and every row's results.
+
+    Raises:
+        InputError: a run's record is missing or malformed. Faulty results are failures of their rows instead.
+    """
+    records = [read_run(folder) for folder in folders]
+    total, done, runs = sum(len(record.rows) for record in records), 0, []
+    for folder, tag, record in zip(folders, _tags(folders), records, strict=True):
+        rows = []
+        for row in record.rows:
+            rows.append(_load_row(folder, row, f"{row.name} ({tag})" if tag else row.name))
+            done += 1
+            progress(done, total, row.name)
+        runs.append(Run(folder, tag, record, tuple(rows)))
+    return tuple(runs)
+
+
+def _tags(folders: Sequence[Path]) -> list[str]:
+    """Name runs by their folders where that tells them apart, else by number."""
+    if len(folders) < 2:
+        return [""] * len(folders)
+    names = [folder.resolve().name for folder in folders]
+    return names if len(set(names)) == len(names) else [f"run {i}" for i in range(1, len(folders) + 1)]
+
+
+def _load_row(run: Path, row: RowRecord, name: str) -> Row:
+    failures = [] if row.failure is None else [row.failure]
+    found = []
+    for result_id in row.results:
+        try:
+            found.append(_load_result(result_folder(run, result_id)))
+        except (SemgridError, OSError, ValueError) as error:
+            failures.append(str(error))
+    if not row.results and row.failure is None:
+        failures.append("it has no result")
+    return Row(name, row, tuple(sorted(found, key=lambda result: result.seed)), tuple(failures), run)
+
+
+def _load_result(folder: Path) -> Result:
+    record, counts = read_result(folder), read_counts(folder)
+    if len(counts) != len(record.windows):
+        raise ValueError(f"{folder / 'counts.npz'}: {len(counts)} windows, but result.json has {len(record.windows)}")
+    if counts.min(initial=0) < 0 or counts.sum(axis=(1, 2)).max(initial=0) > np.iinfo(np.int32).max // CLASS_COUNT:
+        raise ValueError(f"{folder / 'counts.npz'}: counts are negative or beyond any grid")
+    return Result(record, counts.astype(np.int32), read_history(folder), folder)

@@ -1,0 +1,128 @@
+"""What the numbers say, in a few plain sentences and a few large figures."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from semgrid_eval.report.cells import interval, interval_phrase, number, plural, signed
+from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, HEADLINE, Headline, verdict
+from semgrid_eval.report.estimates import Estimate, RowScores
+from semgrid_eval.report.reading import Row, Run
+from semgrid_eval.report.tables import LABELS
+
+Scores = Mapping[str, RowScores]
+_WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One difference, large: its label, the value, its interval and where they lie on a common axis (percent)."""
+
+    label: str
+    value: str
+    note: str
+    tone: str
+    word: str
+    low: float
+    high: float
+    at: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The head of a page: sentences, and tiles with what they compare."""
+
+    sentences: tuple[str, ...]
+    compared: str
+    tiles: tuple[Tile, ...]
+
+
+def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None) -> Summary:
+    """Put a report into a few sentences."""
+    sentences = [_which(scores, found), _against_reference(scores, found), _evidence(runs, scores)]
+    compared, tiles = _tiles(scores, found)
+    return Summary(tuple(sentence for sentence in sentences if sentence), compared, tiles)
+
+
+def _which(scores: Scores, found: Headline | None) -> str:
+    if found is None:
+        return "No row has a score: nothing can be compared."
+    best = scores[found.best.name]
+    start = f"{found.best.name} predicts best: mean class IoU {number(best.mean[HEADLINE])} without unknown"
+    if found.rival is None:
+        return f"{start} ({interval_phrase(best.estimate(HEADLINE))}); there is no other kind of model to compare with."
+    lead = best.minus(scores[found.rival.name], HEADLINE)
+    kind = "trained model" if found.best.is_baseline else "baseline"
+    phrase = interval_phrase(lead, with_sign=True)
+    return f"{start}, {signed(lead.value)} over {found.rival.name}, the best {kind} ({phrase})."
+
+
+def _against_reference(scores: Scores, found: Headline | None) -> str:
+    model, other = _pair(found)
+    if model is None or other is None:
+        return ""
+    groups: dict[str, list[str]] = {}
+    for column in DIFFERENCE_COLUMNS[:-1]:
+        difference = scores[model.name].minus(scores[other.name], column)
+        text = f"{LABELS[column].lower()} ({signed(difference.value)})"
+        groups.setdefault(verdict(difference), []).append(text)
+    parts = [f"{_WORDS[word]} on {_listed(groups[word])}" for word in _WORDS if word in groups]
+    return f"Against {other.name}, {model.name} is {'; '.join(parts)}."
+
+
+def _evidence(runs: Sequence[Run], scores: Scores) -> str:
+    rows = [entry.row for entry in scores.values()]
+    records = [window for row in rows for result in row.results for window in result.record.windows]
+    windows = len({(window.recording, window.target_stamp_ns) for window in records})
+    recordings = len({window.recording for window in records})
+    text = f"This rests on {plural(windows, 'window')} from {plural(recordings, 'recording')}"
+    seeds = [len(row.results) for row in rows if row.results[0].record.seed is not None]
+    if seeds:
+        span = plural(max(seeds), "seed") if min(seeds) == max(seeds) else f"{min(seeds)} to {max(seeds)} seeds"
+        text += f" and {span} for each trained row"
+    failed = sum(bool(row.failures) for run in runs for row in run.rows)
+    text += f"; {plural(failed, 'row')} failed." if failed else "; no row failed."
+    return text + (_doubt(recordings, seeds))
+
+
+def _doubt(recordings: int, seeds: Sequence[int]) -> str:
+    if recordings < 2:
+        return " With fewer than two recordings there are no intervals."
+    if seeds and min(seeds) == 1:
+        return " Intervals of rows with one seed leave out the chance in training."
+    return ""
+
+
+def _tiles(scores: Scores, found: Headline | None) -> tuple[str, tuple[Tile, ...]]:
+    model, other = _pair(found)
+    if model is None or other is None:
+        return "", ()
+    differences = {c: scores[model.name].minus(scores[other.name], c) for c in DIFFERENCE_COLUMNS}
+    bounds = [abs(v) for d in differences.values() for v in (d.value, d.low, d.high) if v == v]
+    reach = 1.1 * max([*bounds, 1e-3])
+    tiles = tuple(_tile(LABELS[column], difference, reach) for column, difference in differences.items())
+    return f"{model.name} \N{MINUS SIGN} {other.name}", tiles
+
+
+def _tile(label: str, difference: Estimate, reach: float) -> Tile:
+    def place(value: float) -> float:
+        return round(50 + 50 * (value if value == value else difference.value) / reach, 1)
+
+    tone = verdict(difference)
+    if difference.value != difference.value:
+        return Tile(label, signed(difference.value), "", tone, "absent", 50.0, 50.0, 50.0)
+    note = interval(difference, with_sign=True) or "no interval"
+    low, high, at = place(difference.low), place(difference.high), place(difference.value)
+    return Tile(label, signed(difference.value), note, tone, _WORDS[tone], low, high, at)
+
+
+def _pair(found: Headline | None) -> tuple[Row | None, Row | None]:
+    """Choose the trained row and the baseline that the head of the page compares."""
+    if found is None:
+        return None, None
+    if found.best.is_baseline:
+        return found.rival, found.best if found.rival is not None else None
+    return found.best, found.reference
+
+
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

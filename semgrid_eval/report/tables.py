@@ -1,0 +1,168 @@
+"""The page's tables: categories, differences to the baselines, classes beside the paper, and other countings."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.report.cells import (
+    Cell,
+    Line,
+    Table,
+    difference_cell,
+    interval_phrase,
+    number,
+    plain_cell,
+    plural,
+    value_cell,
+)
+from semgrid_eval.report.comparison import reference_of, verdict
+from semgrid_eval.report.estimates import CATEGORY_COLUMNS, MERGED_COLUMNS, Estimate, RowScores
+from semgrid_eval.report.longform import target_cells
+from semgrid_eval.report.paper import paper_table
+
+Scores = Mapping[str, RowScores]
+
+LABELS = {
+    "static": "Static",
+    "static_known": "Static, known",
+    "small_static": "Small static",
+    "vehicles": "Vehicles",
+    "small_dynamic": "Small dynamic",
+    "mean_known": "Mean, known",
+    **{name: name.replace("_", " ") for name in CLASS_NAMES},
+    "merged_static": "Static, merged",
+    "merged_small_static": "Small static, merged",
+    "merged_vehicles": "Vehicles, merged",
+    "merged_small_dynamic": "Small dynamic, merged",
+}
+
+
+def value_table(name: str, caption: str, scores: Scores, columns: Sequence[str]) -> Table:
+    """Show the columns of every row, the best of each column marked."""
+    best = {column: _best(scores, column) for column in columns}
+    bodies = []
+    for row, entry in scores.items():
+        cells = [
+            value_cell(entry.estimate(c), title=_evidence(entry, c), best=entry.mean[c] == best[c]) for c in columns
+        ]
+        bodies.append((Line(row, tuple(cells), title=entry.row.record.label),))
+    return Table(name, caption, "Row", _headers(scores, columns), tuple(bodies))
+
+
+def category_values(scores: Scores) -> Table:
+    """Show the categories as the paper counts them."""
+    caption = "Category scores: mean of the class IoUs, with 95 % interval. Best of each column in bold."
+    return value_table("categories", caption, scores, CATEGORY_COLUMNS)
+
+
+def merged_values(scores: Scores) -> Table:
+    """Show the categories with their classes merged before counting."""
+    caption = "Category scores after merging the classes of a category, as the Cityscapes benchmark counts."
+    return value_table("merged", caption, scores, MERGED_COLUMNS)
+
+
+def difference_table(name: str, scores: Scores, columns: Sequence[str]) -> Table | None:
+    """Show each row's paired difference to its baseline; None where no row has one."""
+    rows, bodies = [entry.row for entry in scores.values()], []
+    for entry in scores.values():
+        reference = reference_of(entry.row, rows)
+        if reference is None:
+            continue
+        differences = {column: entry.minus(scores[reference.name], column) for column in columns}
+        cells = [
+            difference_cell(d, verdict(d), title=f"{_evidence(entry, c)}; difference: {_interval_text(d)}")
+            for c, d in differences.items()
+        ]
+        bodies.append((Line(f"{entry.row.name} \N{MINUS SIGN} {reference.name}", tuple(cells)),))
+    caption = "Differences to the baseline, resampled together. Marked where the interval excludes zero."
+    return Table(name, caption, "Rows", _headers(scores, columns), tuple(bodies)) if bodies else None
+
+
+def class_values(scores: Scores) -> Table:
+    """Show the classes of every row beside the paper's values and the difference to them."""
+    best = {name: _best(scores, name) for name in CLASS_NAMES}
+    bodies = tuple(_class_body(entry, best) for entry in scores.values())
+    caption = "Class IoU beside the paper's Table A1. The paper's numbers come from Cityscapes' validation set."
+    return Table("classes", caption, "Row", _headers(scores, CLASS_NAMES), bodies)
+
+
+def run_differences(scores: Scores, tags: Sequence[str], columns: Sequence[str]) -> Table | None:
+    """Show, for rows of one name in several runs, the difference of each later run to the first."""
+    groups: dict[str, list[RowScores]] = {}
+    for entry in scores.values():
+        groups.setdefault(entry.row.record.name, []).append(entry)
+    bodies = []
+    for group in groups.values():
+        for entry in group[1:]:
+            differences = [entry.minus(group[0], column) for column in columns]
+            cells = tuple(difference_cell(d, verdict(d), title=_interval_text(d)) for d in differences)
+            bodies.append((Line(f"{entry.row.name} \N{MINUS SIGN} {group[0].row.name}", cells),))
+    caption = f"The same rows in several runs: differences to {tags[0] if tags else 'the first run'}."
+    return Table("runs", caption, "Rows", _headers(scores, columns), tuple(bodies)) if bodies else None
+
+
+def _class_body(entry: RowScores, best: dict[str, float]) -> tuple[Line, ...]:
+    values = tuple(
+        value_cell(entry.estimate(name), title=_evidence(entry, name), best=entry.mean[name] == best[name])
+        for name in CLASS_NAMES
+    )
+    lines = [Line(entry.row.name, values, title=entry.row.record.label)]
+    paper = paper_table().get(entry.row.record.name)
+    if paper is not None:
+        lines.append(Line("paper", tuple(plain_cell(paper[name]) for name in CLASS_NAMES), "paper"))
+        gaps = (entry.mean[name] - paper[name] for name in CLASS_NAMES)
+        lines.append(Line("difference", tuple(plain_cell(gap, with_sign=True) for gap in gaps), "paper"))
+    return tuple(lines)
+
+
+def _headers(scores: Scores, columns: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    first = next(iter(scores.values()), None)
+    cells = {} if first is None else target_cells(first.row.results[0].counts)
+    return tuple((LABELS[column], f"{cells.get(column, 0):,} cells") for column in columns)
+
+
+def _best(scores: Scores, column: str) -> float:
+    values = [entry.mean[column] for entry in scores.values()]
+    return max((value for value in values if np.isfinite(value)), default=np.nan)
+
+
+def _evidence(entry: RowScores, column: str) -> str:
+    """Say what stands behind a number, for its tooltip."""
+    row = entry.row
+    cells = target_cells(row.results[0].counts)[column]
+    parts = [
+        f"{row.name}, {LABELS[column]}: {number(entry.mean[column])}",
+        plural(cells, "target cell"),
+        plural(row.windows, "window"),
+        plural(len(row.results), "seed") if row.results[0].record.seed is not None else "no chance involved",
+        interval_phrase(entry.estimate(column)),
+    ]
+    return "; ".join(parts)
+
+
+def _interval_text(difference: Estimate) -> str:
+    return interval_phrase(difference, with_sign=True)
+
+
+def training_table(rows: Sequence[RowScores]) -> Table:
+    """Show what each row cost: parameters, training and prediction time, device."""
+    bodies = []
+    for entry in rows:
+        records = [result.record for result in entry.row.results]
+        train = [record.train_seconds for record in records if record.train_seconds is not None]
+        cells = (
+            Cell(f"{records[0].parameters:,}" if records[0].parameters else "none", records[0].parameters or 0),
+            Cell(str(len(records)), len(records)),
+            Cell(f"{np.mean(train):.0f} s" if train else "none", float(np.mean(train)) if train else 0.0),
+            Cell(_per_window(entry), None),
+            Cell(", ".join(sorted({record.device for record in records}))),
+        )
+        bodies.append((Line(entry.row.name, cells),))
+    columns = tuple((text, "") for text in ("Parameters", "Results", "Training", "Prediction", "Device"))
+    return Table("costs", "What each row cost; times are means over seeds.", "Row", columns, tuple(bodies))
+
+
+def _per_window(entry: RowScores) -> str:
+    seconds = float(np.mean([result.record.predict_seconds for result in entry.row.results]))
+    return f"{1000 * seconds / entry.row.windows:.1f} ms a window"

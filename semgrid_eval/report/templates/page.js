@@ -1,0 +1,85 @@
+"use strict";
+(() => {
+  const value = (body, column) => {
+    const cell = body.rows[0].cells[column];
+    if (column === 0) return cell.textContent.trim();
+    return cell.dataset.sort === undefined ? (/\d/.test(cell.textContent) ? cell.textContent.trim() : null) : Number(cell.dataset.sort);
+  };
+
+  const compare = (a, b) => {
+    if (a === null || b === null) return (a === null) - (b === null);
+    return typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b), "en", { numeric: true });
+  };
+
+  const sort = (table, column) => {
+    const heads = table.tHead.rows[0].cells;
+    const descending = heads[column].getAttribute("aria-sort") !== "descending" && column > 0 || heads[column].getAttribute("aria-sort") === "ascending";
+    for (const head of heads) head.removeAttribute("aria-sort");
+    heads[column].setAttribute("aria-sort", descending ? "descending" : "ascending");
+    const bodies = [...table.tBodies].sort((a, b) => {
+      const x = value(a, column), y = value(b, column);
+      return x === null || y === null || !descending ? compare(x, y) : compare(y, x);
+    });
+    table.append(...bodies);
+  };
+
+  const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+
+  const label = (cell) => {
+    const copy = cell.cloneNode(true);
+    copy.querySelectorAll("small, .mark").forEach((part) => part.remove());
+    return copy.textContent.trim();
+  };
+
+  const csv = (table) =>
+    [...table.rows]
+      .filter((row) => !row.parentElement.hidden)
+      .map((row) => [...row.cells].map((cell) => quoted(cell.dataset.sort ?? label(cell))).join(","))
+      .join("\n") + "\n";
+
+  const download = (table, name) => {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([csv(table)], { type: "text/csv" }));
+    link.download = `${name}.csv`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  };
+
+  const element = (kind, properties, ...children) => {
+    const made = Object.assign(document.createElement(kind), properties);
+    made.append(...children);
+    return made;
+  };
+
+  for (const holder of document.querySelectorAll("[data-table]")) {
+    const table = holder.querySelector("table"), name = holder.dataset.table;
+    [...table.tHead.rows[0].cells].forEach((head, column) => {
+      head.prepend(element("button", { type: "button", onclick: () => sort(table, column) }, head.firstChild));
+    });
+    const tools = element("div", { className: "tools" });
+    if (table.tBodies.length > 3) {
+      const find = element("input", { type: "search", placeholder: "Filter rows" });
+      find.setAttribute("aria-label", `Filter rows: ${table.caption.textContent}`);
+      find.oninput = () => {
+        const wanted = find.value.toLowerCase();
+        for (const body of table.tBodies) body.hidden = !body.textContent.toLowerCase().includes(wanted);
+      };
+      tools.append(find);
+    }
+    const save = element("button", { type: "button", onclick: () => download(table, name) }, "Download CSV");
+    save.setAttribute("aria-label", `Download CSV: ${table.caption.textContent}`);
+    tools.append(save);
+    holder.prepend(tools);
+  }
+
+  const links = new Map([...document.querySelectorAll("nav a")].map((link) => [link.hash.slice(1), link]));
+  const seen = new IntersectionObserver((entries) => {
+    for (const entry of entries.filter((each) => each.isIntersecting)) {
+      links.forEach((link) => link.removeAttribute("aria-current"));
+      links.get(entry.target.id)?.setAttribute("aria-current", "true");
+    }
+  }, { rootMargin: "-15% 0px -75% 0px" });
+  document.querySelectorAll("main > section").forEach((section) => seen.observe(section));
+
+  window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((part) => { part.open = true; }));
+})();

@@ -1,0 +1,226 @@
+"""A plausible run folder, made in a second or two from nothing: streets, shifted inputs and imperfect predictors."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CLASS_NAMES, UNKNOWN
+from semgrid_eval.files import digest_value
+from semgrid_eval.scores import results
+from semgrid_eval.scores.iou import confusion
+
+SIDE = 128
+FRAME_NS = 58_823_529
+Grid = NDArray[np.uint8]
+ID = {name: index for index, name in enumerate(CLASS_NAMES)}
+
+
+@dataclass(frozen=True)
+class FakeRow:
+    experiment: str
+    model: str
+    wrong: float = 0.0  # share of wrongly predicted cells of a trained model
+    seeds: int = 0  # 0: the predictor does not depend on chance
+    sensors: tuple[str, ...] = ("front",)
+    translate: bool = True
+    horizon_steps: int = 1
+    failure: str | None = None
+
+    @property
+    def name(self) -> str:
+        return f"{self.model}-{self.experiment}"
+
+
+ROWS = (
+    FakeRow("DC", "BL"),
+    FakeRow("NT", "BL", translate=False),
+    FakeRow("Fuse", "BL"),
+    FakeRow("DC", "ED", wrong=0.06, seeds=3),
+    FakeRow("Sp2", "BL", sensors=("lower", "upper")),
+    FakeRow("Sp2", "ED", wrong=0.10, seeds=2, sensors=("lower", "upper")),
+    FakeRow("NT", "ED", translate=False, failure="the loss became not a number in epoch 3"),
+)
+
+
+def make_fake_run(
+    run: Path,
+    *,
+    rows: tuple[FakeRow, ...] = ROWS,
+    recordings: int = 8,
+    windows: int = 2,
+    title: str = "Town, small",
+    prefix: str = "town",
+) -> Path:
+    """Write a run with `windows` windows for each of `recordings` recordings and return its folder."""
+    made = _Maker(run, [f"{prefix}_{i:03d}" for i in range(recordings)], windows)
+    records = tuple(made.row(row) for row in rows)
+    logs = tuple(
+        results.LogRecord(name=n, path=f"logs/{n}.mcap", digest=digest_value(n), split="val", dataset="synthetic")
+        for n in made.names
+    )
+    results.write_run(
+        run,
+        results.RunRecord(
+            format_version=results.FORMAT_VERSION,
+            title=title,
+            command="semgrid-eval run smoke --logs logs --out run",
+            matrix={"rows": [row.name for row in rows], "training": {"epochs": 6, "batch": 8}},
+            versions={"semgrid-eval": "0.1.0", "python": "3.11.2", "torch": "2.13.0"},
+            machine={"cpu": "two shared cores", "memory": "8 GiB", "system": "Linux"},
+            started="2026-01-02T03:04:05Z",
+            seconds=312.5,
+            logs=logs,
+            failed_logs={f"logs/{prefix}_broken.mcap": "the index is missing"},
+            rows=records,
+        ),
+    )
+    return run
+
+
+class _Maker:
+    def __init__(self, run: Path, names: list[str], windows: int) -> None:
+        self.run, self.names = run, names
+        self.records = tuple(
+            results.WindowRecord(recording=n, log=n, target_frame=20 + k, target_stamp_ns=(20 + k) * FRAME_NS)
+            for n in names
+            for k in range(windows)
+        )
+        scenes = [_scene(np.random.default_rng([7, i]), k) for i in range(len(names)) for k in range(windows)]
+        self.past = np.array([s[0] for s in scenes], np.uint8).reshape(-1, 2, SIDE, SIDE)
+        self.target = np.array([s[1] for s in scenes], np.uint8).reshape(-1, SIDE, SIDE)
+        self.truth = np.array([s[2] for s in scenes], np.uint8).reshape(-1, SIDE, SIDE)
+        self.mask = (self.past != UNKNOWN).any(1) & (self.target == UNKNOWN)
+
+    def row(self, row: FakeRow) -> results.RowRecord:
+        ids: tuple[str, ...] = ()
+        if row.failure is None:
+            inputs = self._inputs(row)
+            windows_id = digest_value([row.experiment, len(self.records), self.names])
+            arrays = {"inputs": inputs, "target": self.target, "mask": self.mask}
+            results.write_arrays(results.windows_file(self.run, windows_id), arrays)
+            ids = tuple(self._result(row, seed, inputs, windows_id) for seed in range(max(1, row.seeds)))
+        return results.RowRecord(
+            name=row.name,
+            experiment=row.experiment,
+            model=row.model,
+            label=f"{row.name}: {'network' if row.model == 'ED' else 'model-driven baseline'}",
+            inputs=2,
+            step_frames=5,
+            horizon_steps=row.horizon_steps,
+            sensors=row.sensors,
+            translate=row.translate,
+            results=ids,
+            failure=row.failure,
+        )
+
+    def _inputs(self, row: FakeRow) -> Grid:
+        past = self.past if row.translate else np.roll(self.past, (-6, -3), axis=(2, 3))
+        if len(row.sensors) == 1:
+            return past[:, None]
+        rows = np.arange(SIDE)[:, None]
+        near, far = np.where(rows > 78, past, UNKNOWN), np.where(rows < 64, past, UNKNOWN)
+        return np.stack([near, far], axis=1).astype(np.uint8)
+
+    def _predict(self, row: FakeRow, seed: int, inputs: Grid) -> tuple[Grid, Grid]:
+        newest = inputs[:, :, -1].max(axis=1)
+        if row.model == "ED":
+            return _guess(np.random.default_rng([11, seed, len(row.experiment)]), row, self.truth)
+        older = inputs[:, :, 0].max(axis=1)
+        fused = np.where(newest == UNKNOWN, older, newest) if row.experiment == "Fuse" else newest
+        return fused, np.full_like(fused, 255)
+
+    def _result(self, row: FakeRow, seed: int, inputs: Grid, windows_id: str) -> str:
+        prediction, certainty = self._predict(row, seed, inputs)
+        trained = row.seeds > 0
+        config = {"model": row.model, "experiment": row.experiment, "depth": 3 if trained else None}
+        result_id = digest_value([config, seed, self.names])
+        folder = results.result_folder(self.run, result_id)
+        results.write_arrays(folder / "predictions.npz", {"prediction": prediction, "certainty": certainty})
+        results.write_arrays(folder / "counts.npz", {"counts": confusion(self.target, prediction, self.mask)})
+        if trained:
+            (folder / "history.csv").write_text(_history(seed, row.wrong))
+        record = results.ResultRecord(
+            format_version=results.FORMAT_VERSION,
+            id=result_id,
+            config=config,
+            log_digests=tuple(digest_value(n) for n in self.names),
+            seed=seed if trained else None,
+            windows_id=windows_id,
+            windows=self.records,
+            device="cpu",
+            train_seconds=80.0 + seed if trained else None,
+            predict_seconds=1.25,
+            parameters=480_000 if trained else None,
+        )
+        results.write_result(folder, record)
+        return result_id
+
+
+def _history(seed: int, wrong: float) -> str:
+    lines = ["epoch,updates,learning_rate,loss,validation_loss,seconds"]
+    for epoch in range(1, 7):
+        loss = wrong + 1.5 * 0.6**epoch + 0.01 * seed
+        lines.append(f"{epoch},{epoch * 50},{1e-3 if epoch < 5 else 1e-4},{loss:.4f},{loss * 1.08:.4f},{13.0}")
+    return "\n".join(lines) + "\n"
+
+
+def _scene(rng: np.random.Generator, step: int) -> tuple[list[Grid], Grid, Grid]:
+    """Two aligned inputs, the target as the sensor sees it, and the world behind it."""
+    world = _street(rng)
+    cars = [(int(rng.integers(10, 100)), int(rng.choice([-6, -3, 2, 5])), int(rng.integers(-5, 6))) for _ in range(5)]
+    frames = [_with_cars(world, cars, when + step) for when in (-2, -1, 0)]
+    seen = [
+        np.where(_view(rng, back), frame, UNKNOWN).astype(np.uint8)
+        for frame, back in zip(frames, (10, 5, 0), strict=True)
+    ]
+    return [_flicker(rng, s) for s in seen[:2]], _flicker(rng, seen[2]), frames[2]
+
+
+def _street(rng: np.random.Generator) -> Grid:
+    world = np.full((SIDE, SIDE), ID["building"], np.uint8)
+    world[:, 20:108][rng.random((SIDE, 88)) < 0.02] = ID["vegetation"]
+    rows, slope = np.arange(SIDE), rng.uniform(-0.25, 0.25)
+    centre = 64 + slope * (SIDE - rows) + 3 * np.sin(rows / 20)
+    across = np.abs(np.arange(SIDE)[None] - centre[:, None])
+    world[(across > 18) & (across < 26) & (np.sin(rows / 9)[:, None] > 0)] = ID["vegetation"]
+    world[across < 15] = ID["sidewalk"]
+    world[across < 10] = ID["road"]
+    for _ in range(6):
+        row = int(rng.integers(4, SIDE - 4))
+        side = int(centre[row] + rng.choice([-12, 12]))
+        kind = rng.choice(["person", "pole_sign", "bicycle"])
+        world[row : row + 2, side : side + 2] = ID[str(kind)]
+    return world
+
+
+def _with_cars(world: Grid, cars: list[tuple[int, int, int]], when: int) -> Grid:
+    frame = world.copy()
+    for index, (row, offset, speed) in enumerate(cars):
+        top, left = max(0, row + speed * when), 64 + offset
+        frame[top : top + 6, left : left + 3] = ID["large_vehicle" if index == 4 else "car"]
+    return frame
+
+
+def _view(rng: np.random.Generator, back: int) -> NDArray[np.bool_]:
+    rows, columns = np.mgrid[0:SIDE, 0:SIDE]
+    ahead = SIDE - 1 - rows + back - 6
+    wide = np.abs(columns - 64) < 0.42 * ahead
+    shadow = np.abs(columns - rng.integers(30, 98)) < 0.06 * ahead - 2
+    return wide & ~shadow & (ahead > 4)
+
+
+def _flicker(rng: np.random.Generator, grid: Grid) -> Grid:
+    blocks = np.kron(rng.random((SIDE // 2, SIDE // 2)) < 0.03, np.ones((2, 2), bool))
+    return np.where(blocks, UNKNOWN, grid).astype(np.uint8)
+
+
+def _guess(rng: np.random.Generator, row: FakeRow, truth: Grid) -> tuple[Grid, Grid]:
+    """A network that saw the truth through a wide view and got a share of it wrong, in blocks."""
+    view = np.array([_view(rng, 0) for _ in truth], bool).reshape(truth.shape)
+    half = (len(truth), SIDE // 2, SIDE // 2)
+    blocks = np.kron(rng.random(half) < row.wrong, np.ones((1, 2, 2), bool))
+    guessed = np.where(blocks, np.roll(truth, 9, axis=2), truth)
+    prediction = np.where(view, guessed, UNKNOWN).astype(np.uint8)
+    return prediction, np.where(blocks, 130, 240).astype(np.uint8)
