@@ -1,0 +1,143 @@
+"""What a training leaves in its folder: a checkpoint while it lasts, its history, and in the end the weights."""
+
+import csv
+import io
+import pickle
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import torch
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.files import atomic_file, write_text
+from semgrid_eval.models.network import EncoderDecoder, load_network, read_notes, save_network
+
+WEIGHTS_FILE = "weights.safetensors"
+HISTORY_FILE = "history.csv"
+CHECKPOINT_FILE = "checkpoint.pt"
+
+
+class EpochRecord(NamedTuple):
+    """One row of the history; losses are masked means, `seconds` the epoch's own time without validation."""
+
+    epoch: int  # counted from 1
+    updates: int
+    learning_rate: float
+    loss: float
+    validation_loss: float | None
+    seconds: float
+
+
+class TrainingFolder:
+    """The folder of one training, which `key` tells from every other."""
+
+    def __init__(self, path: Path, key: str) -> None:
+        self._path = path
+        self._key = key
+
+    def is_complete(self) -> bool:
+        """Tell whether the training was finished.
+
+        Raises:
+            InputError: the weights are damaged or another training's.
+        """
+        weights = self._path / WEIGHTS_FILE
+        if not weights.is_file():
+            return False
+        self._check_key(read_notes(weights).get("training"), weights)
+        return True
+
+    def read(self, device: torch.device) -> tuple[EncoderDecoder, list[EpochRecord]]:
+        """Read a finished training.
+
+        Raises:
+            InputError: a file is missing or damaged.
+        """
+        self._checkpoint.unlink(missing_ok=True)  # a stop between the weights and this leaves it
+        return load_network(self._path / WEIGHTS_FILE, device), read_history(self._path / HISTORY_FILE)
+
+    def restore(self, network: EncoderDecoder, optimizer: torch.optim.Optimizer) -> list[EpochRecord]:
+        """Load the checkpoint into network and optimizer and give the history so far; nothing where there is none.
+
+        Raises:
+            InputError: the checkpoint is damaged or another training's.
+        """
+        if not self._checkpoint.is_file():
+            return []
+        device = next(network.parameters()).device
+        try:
+            state: dict[str, Any] = torch.load(self._checkpoint, map_location=device, weights_only=True)
+            self._check_key(state["key"], self._checkpoint)
+            network.load_state_dict(state["network"])
+            optimizer.load_state_dict(state["optimizer"])
+            return [EpochRecord(*row) for row in state["history"]]
+        except (OSError, RuntimeError, ValueError, KeyError, TypeError, EOFError, pickle.UnpicklingError) as error:
+            raise InputError(f"is damaged; delete it to train afresh ({error})", path=self._checkpoint) from error
+
+    def keep(self, network: EncoderDecoder, optimizer: torch.optim.Optimizer, history: Sequence[EpochRecord]) -> None:
+        """Write the checkpoint, then the history: a stop loses nothing that was kept before.
+
+        Raises:
+            InputError: the folder cannot be written to.
+        """
+        state = {
+            "key": self._key,
+            "network": network.state_dict(),
+            "optimizer": optimizer.state_dict(),
+            "history": [tuple(row) for row in history],
+        }
+        with atomic_file(self._checkpoint) as stream:
+            torch.save(state, stream)
+        write_history(self._path / HISTORY_FILE, history)
+
+    def finish(self, network: EncoderDecoder, history: Sequence[EpochRecord]) -> None:
+        """Write history and weights and remove the checkpoint.
+
+        Raises:
+            InputError: the folder cannot be written to.
+        """
+        write_history(self._path / HISTORY_FILE, history)
+        save_network(network, self._path / WEIGHTS_FILE, training=self._key)
+        self._checkpoint.unlink(missing_ok=True)
+
+    @property
+    def _checkpoint(self) -> Path:
+        return self._path / CHECKPOINT_FILE
+
+    def _check_key(self, found: object, path: Path) -> None:
+        if found != self._key:
+            raise InputError(f"belongs to another training ({found}, not {self._key})", path=path)
+
+
+def write_history(path: Path, history: Sequence[EpochRecord]) -> None:
+    """Write the history as CSV; a validation loss that was not asked for is empty."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(EpochRecord._fields)
+    writer.writerows(history)
+    write_text(path, buffer.getvalue())
+
+
+def read_history(path: Path) -> list[EpochRecord]:
+    """Read a history.
+
+    Raises:
+        InputError: it is missing or damaged.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            return [_record(row) for row in csv.DictReader(stream)]
+    except (OSError, ValueError, KeyError, TypeError, csv.Error) as error:
+        raise InputError(f"is no history of a training: {error}", path=path) from error
+
+
+def _record(row: dict[str, str]) -> EpochRecord:
+    return EpochRecord(
+        epoch=int(row["epoch"]),
+        updates=int(row["updates"]),
+        learning_rate=float(row["learning_rate"]),
+        loss=float(row["loss"]),
+        validation_loss=float(row["validation_loss"]) if row["validation_loss"] else None,
+        seconds=float(row["seconds"]),
+    )

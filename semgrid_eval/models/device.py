@@ -1,0 +1,80 @@
+"""Where models run: device, precision, memory of the process and seeds."""
+
+import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Literal
+
+import torch
+
+from semgrid_eval.errors import ConfigError
+
+Precision = Literal["auto", "float32", "bf16"]
+
+_CPU_FLAGS = Path("/proc/cpuinfo")
+_BF16_FLAGS = {"avx512_bf16", "amx_bf16"}
+# Parameters of glibc's mallopt and values that make it keep and re-use its memory.
+_MALLOPT = {-4: 0, -1: 2**31 - 1, -2: 256 << 20}  # M_MMAP_MAX, M_TRIM_THRESHOLD, M_TOP_PAD
+
+
+def choose_device(name: str = "auto") -> torch.device:
+    """Turn `auto` (CUDA where there is one, else CPU), `cpu`, `cuda`, `cuda:1` ... into a device.
+
+    Raises:
+        ConfigError: there is no such device here.
+    """
+    if name == "auto":
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    try:
+        device = torch.device(name)
+        torch.empty(1, device=device)
+    except (RuntimeError, AssertionError):
+        raise ConfigError(f"no device {name!r} here; auto, cpu and cuda are known names", field="device") from None
+    return device
+
+
+def choose_precision(name: Precision, device: torch.device) -> torch.dtype:
+    """Turn `auto` into bfloat16 where the device multiplies in it natively, else float32.
+
+    On an AMD EPYC with avx512_bf16 training in bfloat16 is 1.7 to 2 times as fast as in float32
+    (`tools/bench_training.py`); on a CPU without such instructions it is slower.
+    """
+    native = torch.cuda.is_bf16_supported() if device.type == "cuda" else device.type == "cpu" and cpu_has_bf16()
+    return torch.bfloat16 if name == "bf16" or (name == "auto" and native) else torch.float32
+
+
+@cache
+def cpu_has_bf16() -> bool:
+    """Tell whether this CPU multiplies bfloat16 natively; False where the system does not say."""
+    try:
+        text = _CPU_FLAGS.read_text(encoding="ascii", errors="ignore")
+    except OSError:
+        return False
+    flags = next((line for line in text.splitlines() if line.startswith("flags")), "")
+    return not _BF16_FLAGS.isdisjoint(flags.split())
+
+
+def keep_freed_memory() -> None:
+    """Make glibc keep freed memory for the whole process instead of giving each large tensor back to the system.
+
+    Page faults of fresh memory otherwise take up to half of the time of a training on a CPU. Elsewhere: no effect.
+    """
+    try:
+        mallopt = ctypes.CDLL(None).mallopt
+    except (OSError, TypeError, AttributeError):  # not glibc
+        return
+    for parameter, value in _MALLOPT.items():
+        mallopt(parameter, value)
+
+
+@contextmanager
+def seeded(seed: int, device: torch.device) -> Iterator[None]:
+    """Seed torch's own generators of CPU and device inside the block and restore them after it."""
+    with torch.random.fork_rng([device] if device.type == "cuda" else []):
+        torch.default_generator.manual_seed(seed)
+        if device.type == "cuda":
+            with torch.cuda.device(device):
+                torch.cuda.manual_seed(seed)
+        yield
