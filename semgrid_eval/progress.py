@@ -1,5 +1,7 @@
 """How long work tells its caller how far it is; the command line shows it, tests and other programs may ignore it."""
 
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import Protocol
 
 
@@ -12,3 +14,16 @@ class Progress(Protocol):
 
 def silent(done: int, total: int, message: str = "") -> None:
     """Ignore progress."""
+
+
+class Stage(Protocol):
+    """Opens the progress of one named stretch of work."""
+
+    def __call__(self, label: str) -> AbstractContextManager[Progress]:
+        """Begin a stretch called `label`; it ends when the block does."""
+
+
+@contextmanager
+def silent_stage(label: str) -> Iterator[Progress]:
+    """Open a stretch of work whose progress nobody watches."""
+    yield silent
