@@ -1,19 +1,21 @@
 """PNG files as bytes: read headers, decode gray and palette pictures, give label images colours without decoding."""
 
+import io
 import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from semgrid_eval.errors import InputError
 
-MAX_SIDE_PX = 16_384
-GRAY, COLOUR, PALETTE = 0, 2, 3
+MAX_PIXELS = 1 << 26  # 8192 x 8192
+GRAY, PALETTE = 0, 3
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEADER = struct.Struct(">IIBBBBB")
 _CHUNK_OVERHEAD_BYTES = 12  # length, type and CRC
@@ -56,8 +58,8 @@ def read_header(data: bytes, path: Path | None = None) -> PngHeader:
     if kinds[-1] != b"IEND" or b"IDAT" not in kinds:
         raise InputError("is a damaged PNG file: it ends early", path=path)
     header = PngHeader(*_HEADER.unpack_from(data, chunks[0].start + 8)[:4])
-    if not (0 < header.width <= MAX_SIDE_PX and 0 < header.height <= MAX_SIDE_PX):
-        raise InputError(f"is {header}; sides of 1 to {MAX_SIDE_PX} pixels are allowed", path=path)
+    if not 0 < header.width * header.height <= MAX_PIXELS:
+        raise InputError(f"is {header}; 1 to {MAX_PIXELS} pixels are allowed", path=path)
     return header
 
 
@@ -75,15 +77,23 @@ def decode_gray(data: bytes, *, bit_depth: int, path: Path | None = None) -> NDA
     header = read_header(data, path)
     if header.bit_depth != bit_depth or header.colour_type not in (GRAY, PALETTE):
         raise InputError(f"is {header}; {bit_depth} bit gray is needed", path=path)
-    if header.colour_type == PALETTE:
-        data = _without_palette(data)  # OpenCV would give colours instead of indices
-    try:
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except cv2.error as error:
-        raise InputError(f"is a damaged PNG file: {error.err}", path=path) from error
-    if picture is None or picture.dtype.itemsize * 8 != bit_depth or picture.shape != (header.height, header.width):
-        raise InputError("is a damaged PNG file: its pixels cannot be decoded", path=path)
-    return cast("NDArray[np.uint8] | NDArray[np.uint16]", picture)
+    pixels = _pixels(data, path)
+    return pixels.astype(np.uint8, copy=False) if bit_depth == 8 else pixels.astype(np.uint16, copy=False)
+
+
+def decode_ids(data: bytes, path: Path | None = None) -> NDArray[np.uint8]:
+    """Decode ids of at most 8 bits from a gray or palette picture: (H, W).
+
+    Raises:
+        InputError: the file is damaged, of more than 8 bits, or a colour picture.
+    """
+    header = read_header(data, path)
+    if header.bit_depth > 8 or header.colour_type not in (GRAY, PALETTE):
+        raise InputError(f"is {header}; ids of at most 8 bits are needed, gray or palette", path=path)
+    ids = _pixels(data, path).astype(np.uint8, copy=False)
+    if header.colour_type == GRAY and header.bit_depth in (2, 4):
+        ids //= np.uint8(255 // ((1 << header.bit_depth) - 1))  # Pillow spreads such gray over 0..255
+    return ids
 
 
 def encode_gray(picture: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
@@ -96,7 +106,7 @@ def encode_gray(picture: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
 
 
 def with_palette(data: bytes, palette: NDArray[np.uint8], path: Path | None = None) -> bytes:
-    """Turn an 8-bit gray PNG file into a palette file of the same pixel values, whose compressed pixels are untouched.
+    """Turn an 8-bit gray PNG file into a palette file whose compressed pixels are untouched.
 
     Args:
         data: the whole file; an 8-bit palette file gets the new palette.
@@ -109,20 +119,20 @@ def with_palette(data: bytes, palette: NDArray[np.uint8], path: Path | None = No
     header = read_header(data, path)
     if header.bit_depth != 8 or header.colour_type not in (GRAY, PALETTE):
         raise InputError(f"is {header}; 8 bit gray is needed", path=path)
-    return _rewrite(data, PALETTE, _pack(b"PLTE", palette.tobytes()))
-
-
-def _without_palette(data: bytes) -> bytes:
-    return _rewrite(data, GRAY, b"")
-
-
-def _rewrite(data: bytes, colour_type: int, after_header: bytes) -> bytes:
-    """Keep size and pixels of a PNG file, drop all else, set its colour type and put chunks after its header."""
-    chunks = list(_chunks(data, None))
+    chunks = list(_chunks(data, path))
     fields = bytearray(data[chunks[0].start + 8 : chunks[0].end - 4])
-    fields[9] = colour_type
+    fields[9] = PALETTE
     kept = b"".join(data[chunk.start : chunk.end] for chunk in chunks if chunk.kind in (b"IDAT", b"IEND"))
-    return _SIGNATURE + _pack(b"IHDR", bytes(fields)) + after_header + kept
+    return _SIGNATURE + _pack(b"IHDR", bytes(fields)) + _pack(b"PLTE", palette.tobytes()) + kept
+
+
+def _pixels(data: bytes, path: Path | None) -> NDArray[np.generic]:
+    # Pillow gives the indices of a palette picture, where OpenCV gives colours, and was as fast for both kinds.
+    try:
+        with Image.open(io.BytesIO(data), formats=["PNG"]) as picture:
+            return np.array(picture)
+    except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error) as error:
+        raise InputError(f"is a damaged PNG file: {error}", path=path) from error
 
 
 def _pack(kind: bytes, body: bytes) -> bytes:
