@@ -39,6 +39,7 @@ class GridRecording:
         log: path of its log.
         digest: of the log.
         split: `train`, `val` or `test`.
+        dataset: where it comes from.
         sensors: names, in the order of `grids`.
         stamps_ns: (F,) capture times.
         grids: (S, F, H, W) uint8 class ids; each grid is centred on the vehicle at its own time.
@@ -50,6 +51,7 @@ class GridRecording:
     log: str
     digest: str
     split: str
+    dataset: str
     sensors: tuple[str, ...]
     stamps_ns: NDArray[np.int64]
     grids: NDArray[np.uint8]
@@ -116,6 +118,7 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
                 str(log),
                 reader.digest,
                 reader.scene.split,
+                reader.scene.dataset,
                 tuple(sensor.name for sensor in config.all_sensors()),
                 *arrays,
             )
@@ -235,7 +238,7 @@ def _write(path: Path, recordings: list[GridRecording]) -> None:
     first = recordings[0]
     arrays: dict[str, NDArray[np.generic]] = {
         "names": np.array([recording.name for recording in recordings]),
-        "log": np.array([first.digest, first.split, *first.sensors]),
+        "log": np.array([first.digest, first.split, first.dataset, *first.sensors]),
     }
     for number, recording in enumerate(recordings):
         for name in ("stamps_ns", "grids", "position_m", "yaw_rad"):
@@ -245,10 +248,11 @@ def _write(path: Path, recordings: list[GridRecording]) -> None:
 
 def _read(path: Path, log: Path) -> list[GridRecording]:
     head = read_arrays(path, ("names", "log"))
-    digest, split, *sensors = (str(value) for value in head["log"])
+    digest, split, dataset, *sensors = (str(value) for value in head["log"])
     recordings = []
     for number, name in enumerate(head["names"]):
-        keys = tuple(f"{key}_{number}" for key in ("stamps_ns", "grids", "position_m", "yaw_rad"))
-        arrays = read_arrays(path, keys)
-        recordings.append(GridRecording(str(name), str(log), digest, split, tuple(sensors), *(arrays[k] for k in keys)))
+        keys = [f"{key}_{number}" for key in ("stamps_ns", "grids", "position_m", "yaw_rad")]
+        arrays = read_arrays(path, tuple(keys))
+        values = (arrays[key] for key in keys)
+        recordings.append(GridRecording(str(name), str(log), digest, split, dataset, tuple(sensors), *values))
     return recordings

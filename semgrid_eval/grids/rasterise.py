@@ -91,7 +91,7 @@ def _filter_class(layer: Cells, class_id: int, morphology: Morphology) -> NDArra
         # OpenCV reads the kernel at anchor k // 2 in both operations. A Minkowski dilation needs its reflection,
         # which for even sizes has another anchor; without it an opening shifts by a cell.
         anchor = size - 1 - size // 2 if operation is cv2.dilate and morphology == "minkowski" else size // 2
-        layer = operation(layer, np.ones((size, size), np.uint8), anchor=(anchor, anchor))
+        layer = operation(layer, np.ones((size, size), np.uint8), anchor=(anchor, anchor)).astype(np.uint8, copy=False)
     return layer.astype(np.bool_)
 
 

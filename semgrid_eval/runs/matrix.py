@@ -17,10 +17,9 @@ from semgrid_eval.sequences.windows import WindowConfig
 
 TRAINED_MODEL = "ed"
 BASELINES = {
-    "aligned": "newest input moved to the target's time",
-    "repeat": "newest input as it is",
-    "overlay": "upper sensor drawn over the lower, both moved to the target's time",
-    "fuse": "all aligned inputs overlaid, newest known cell wins",
+    "newest": "newest input",
+    "overlay": "newest input of one sensor drawn over the other's",
+    "fuse": "all inputs overlaid, newest known cell wins",
 }
 ROW_LIMIT = 10_000
 
@@ -31,7 +30,7 @@ class Row(Config):
     Args:
         name: unique in the matrix, like `ED-Sp2`; axes fill in `{key}` places.
         experiment: the group in which a report compares rows; the name without `BL-` or `ED-` if not given.
-        model: `ed`, a baseline (`aligned`, `repeat`, `overlay`, `fuse`), or `path.py:Class` of one's own.
+        model: `ed`, a baseline (`newest`, `overlay`, `fuse`), or `path.py:Class` of one's own.
         sensors: inputs, from the grid config's sensors.
         translate: whether inputs are moved to the target's time (T2); the paper's NT rows do not.
         overlay: which sensor the `overlay` baseline draws last (reading 20).
@@ -83,6 +82,7 @@ class Row(Config):
         horizon = self.window.horizon_steps
         parts = [
             what.get(self.model, self.model),
+            "moved to the target's time" if self.translate else "not moved",
             f"{self.window.inputs} inputs",
             f"{horizon} step{'s' if horizon > 1 else ''} of {self.window.step_frames} frames ahead",
         ]

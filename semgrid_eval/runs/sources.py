@@ -1,0 +1,86 @@
+"""The grids that a matrix needs: built once for each grid configuration, split into training and validation."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import torch
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.files import digest_value
+from semgrid_eval.grids.build import GridDataSet, build_grids
+from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.log.store import find_logs
+from semgrid_eval.progress import Stage
+from semgrid_eval.runs.matrix import Row
+from semgrid_eval.scores.results import LogRecord
+from semgrid_eval.sequences.dataset import GridData, stack_recordings
+
+
+class Sources:
+    """Grids of a folder of logs, made when a row first asks for them.
+
+    Args:
+        logs: the folder of logs.
+        cache: folder in which built grids are kept.
+        rows: all rows of the matrix, which tell the sensors that are needed.
+        workers: logs built at once.
+        device: where the grids of training and validation lie.
+        stage: shows progress.
+    """
+
+    def __init__(
+        self, logs: Path, cache: Path, rows: Sequence[Row], *, workers: int, device: torch.device, stage: Stage
+    ) -> None:
+        self._logs = find_logs(logs)
+        self._cache, self._workers, self._device, self._stage = cache, workers, device, stage
+        self._sensors: dict[str, list[str]] = {}
+        for row in rows:
+            self._sensors.setdefault(grid_digest(row.grid), []).extend(row.sensors)
+        self._sets: dict[str, GridDataSet] = {}
+        self._stacked: dict[tuple[str, str], GridData] = {}
+        self.failed: dict[str, str] = {}
+        self.records: dict[str, LogRecord] = {}
+        self.log_of: dict[str, str] = {}  # by name of the recording
+
+    def data(self, config: GridConfig, split: str) -> GridData:
+        """Return the grids of all recordings of one split.
+
+        Raises:
+            InputError: there is no recording of that split.
+        """
+        key = (grid_digest(config), split)
+        if key not in self._stacked:
+            data_set = self._grids(config)
+            chosen = [recording for recording in data_set.recordings if recording.split == split]
+            if not chosen:
+                found = ", ".join(sorted({recording.split for recording in data_set.recordings})) or "none"
+                raise InputError(f"no recording of split {split!r} gave grids (splits found: {found})")
+            sensors = list(dict.fromkeys(self._sensors[key[0]]))
+            stacked = stack_recordings(chosen, cell_m=config.spec.cell_m, sensors=sensors)
+            self._stacked[key] = stacked.to(self._device)
+        return self._stacked[key]
+
+    def _grids(self, config: GridConfig) -> GridDataSet:
+        key = grid_digest(config)
+        if key not in self._sets:
+            with self._stage("grids") as progress:
+                data_set = build_grids(self._logs, self._cache, config, workers=self._workers, progress=progress)
+            self._sets[key] = data_set
+            self.failed.update(data_set.failed)
+            for recording in data_set.recordings:
+                other = self.log_of.setdefault(recording.name, recording.log)
+                if other != recording.log:
+                    raise InputError(f"holds recording {recording.name} like {other}", path=recording.log)
+                self.records[recording.log] = LogRecord(
+                    name=Path(recording.log).stem,
+                    path=recording.log,
+                    digest=recording.digest,
+                    split=recording.split,
+                    dataset=recording.dataset,
+                )
+        return self._sets[key]
+
+
+def grid_digest(config: GridConfig) -> str:
+    """Digest a grid configuration."""
+    return digest_value(config.model_dump(mode="json"))

@@ -1,0 +1,91 @@
+import csv
+from importlib import resources
+
+import pytest
+import yaml
+
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.runs.matrix import load_matrix, preset_names
+
+
+def load(tmp_path, content):
+    path = tmp_path / "m.yaml"
+    path.write_text(content if isinstance(content, str) else yaml.safe_dump(content))
+    return load_matrix(str(path))
+
+
+def test_paper_has_the_rows_of_table_a1_in_its_order():
+    with (resources.files("semgrid_eval.report") / "data" / "table_a1.csv").open() as stream:
+        published = [line["experiment"] for line in csv.DictReader(stream)]
+    assert [row.name for row in load_matrix("paper").rows] == published
+
+
+def test_paper_trains_as_the_supplement_says():
+    rows = {row.name: row for row in load_matrix("paper").rows}
+    dc = rows["ED-DC"]
+    assert (dc.network.depth, dc.network.features, dc.window.inputs, dc.window.step_frames) == (3, 64, 2, 5)
+    assert (dc.training.epochs, dc.training.updates_per_epoch, dc.training.batch, dc.repeats) == (40, 185, 32, 20)
+    assert [rows[f"ED-PH{k}"].window.horizon_steps for k in (1, 2, 3)] == [2, 3, 4]
+    assert {row.window.target_frame for row in rows.values()} == {25}
+    assert not rows["ED-NT"].translate
+    assert not rows["BL-NT"].translate
+    differing = {"name", "experiment"}
+    assert rows["ED-SL2"].model_dump(exclude=differing) == dc.model_dump(exclude=differing)
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_preset_loads(name):
+    assert load_matrix(name).rows
+
+
+def test_axes_multiply_rows_and_fill_in_names(tmp_path):
+    axes = {"grid": {"network.depth": [2, 3]}, "zip": {"network.features": [16, 32], "training.batch": [8, 4]}}
+    row = {"name": "d{network.depth}-f{network.features}", "model": "ed", "axes": axes}
+    rows = load(tmp_path, {"rows": [row]}).rows
+    assert [(r.name, r.network.depth, r.network.features, r.training.batch) for r in rows] == [
+        ("d2-f16", 2, 16, 8),
+        ("d2-f32", 2, 32, 4),
+        ("d3-f16", 3, 16, 8),
+        ("d3-f32", 3, 32, 4),
+    ]
+
+
+def test_rows_override_defaults_key_by_key(tmp_path):
+    matrix = load(
+        tmp_path,
+        {
+            "defaults": {"window": {"step_frames": 3, "target_frame": None}, "grid": {"morphology": "off"}},
+            "rows": [{"name": "a", "model": "newest", "window": {"horizon_steps": 2}}],
+        },
+    )
+    row = matrix.rows[0]
+    assert (row.window.step_frames, row.window.horizon_steps, row.grid.morphology) == (3, 2, "off")
+    assert row.label == "a (newest input, moved to the target's time, 2 inputs, 2 steps of 3 frames ahead)"
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (
+            [{"name": "a", "model": "ed", "netwrok": {}}],
+            r"m\.yaml: row 'a': netwrok: unknown key; .*network",
+        ),
+        ([{"name": "a", "model": "ed", "network": {"debth": 3}}], r"row 'a': network\.debth: unknown key; .*depth"),
+        ([{"name": "a", "model": "de"}], "row 'a': .*'de' is not one of ed, newest, overlay, fuse"),
+        ([{"name": "a", "model": "ed", "sensors": ["left"]}], "row 'a': .*'left' is not one of full, split1_upper"),
+        ([{"name": "a", "model": "overlay"}], "overlay needs two sensors"),
+        ([{"name": "a", "model": "ed"}] * 2, "rows.name: 'a' is the name of 2 rows"),
+        ([{"name": "a{network.depth}", "model": "ed"}], "has a place that no axis fills"),
+        ([{"name": "a", "model": "ed", "axes": {"zip": {"x": [1], "y": [1, 2]}}}], "lists of 1 and 2 values"),
+        ([{"name": "a", "model": "ed", "window": {"inputs": 9}}], "target_frame 25 is too early"),
+        ([], "rows: .*at least 1"),
+    ],
+)
+def test_faults_name_file_row_and_key(tmp_path, rows, message):
+    with pytest.raises(ConfigError, match=message):
+        load(tmp_path, {"rows": rows})
+
+
+def test_a_name_that_is_neither_file_nor_preset_lists_the_presets():
+    with pytest.raises(ConfigError, match=r"papre: is neither a file nor a preset \(.*paper.*\)"):
+        load_matrix("papre")

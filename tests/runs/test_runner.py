@@ -1,0 +1,149 @@
+import json
+import re
+
+import numpy as np
+import pytest
+import yaml
+from support.toy_world import street
+
+from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.log.store import write_log
+from semgrid_eval.runs.matrix import load_matrix
+from semgrid_eval.runs.runner import RunOptions, run_matrix
+from semgrid_eval.scores import results
+from semgrid_eval.scores.iou import category_iou, class_iou
+
+WINDOW = {"step_frames": 3, "target_frame": 8}
+TINY = {"network": {"features": 4, "depth": 2}, "training": {"epochs": 2, "updates_per_epoch": 3, "batch": 2}}
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("logs")
+    for i in range(4):
+        split = "train" if i < 2 else "val"
+        world = street(i, frames=9, speed_mps=8 + i, yaw_rate_radps=0.1 * (i - 1), noise_px=0.05)
+        write_log(world.recording(f"toy_{i:06}_000000", split), folder / split / f"toy{i}.mcap")
+    return folder
+
+
+def run(rows, logs, out, **defaults):
+    path = out.parent / f"{out.name}.yaml"
+    path.write_text(yaml.safe_dump({"seed": 5, "defaults": {"window": WINDOW, **TINY, **defaults}, "rows": rows}))
+    options = RunOptions(device="cpu", workers=1, grids=out.parent / "grids", command="test")
+    return run_matrix(load_matrix(str(path)), logs, out, options)
+
+
+def score(out, record, name):
+    row = next(row for row in record.rows if row.name == name)
+    assert row.failure is None, row.failure
+    counts = results.read_counts(results.result_folder(out, row.results[0]))
+    return float(category_iou(class_iou(counts.sum(axis=0)))["mean_known"])
+
+
+def test_alignment_beats_none_and_a_reversed_motion_is_worse_than_both(tmp_path):
+    for name, direction in (("right", 1.0), ("reversed", -1.0)):
+        for i in range(3):
+            world = street(10 + i, frames=9, speed_mps=9, yaw_rate_radps=0.08 * (i - 1), noise_px=0.05)
+            recording = world.recording(f"{name}_{i:06}_000000", direction=direction)
+            write_log(recording, tmp_path / name / f"{name}{i}.mcap")
+    rows = [{"name": "BL-DC", "model": "newest"}, {"name": "BL-NT", "model": "newest", "translate": False}]
+    right = run(rows, tmp_path / "right", tmp_path / "run_right")
+    wrong = run(rows, tmp_path / "reversed", tmp_path / "run_wrong")
+    aligned, repeated = (score(tmp_path / "run_right", right, name) for name in ("BL-DC", "BL-NT"))
+    reversed_motion = score(tmp_path / "run_wrong", wrong, "BL-DC")
+    assert aligned > repeated + 0.02
+    assert reversed_motion < repeated - 0.02
+
+
+def test_a_run_leaves_results_that_parse_and_belong_together(logs, tmp_path):
+    out = tmp_path / "run"
+    rows = [
+        {"name": "BL-DC", "model": "newest"},
+        {"name": "BL-Fuse", "model": "fuse"},
+        {"name": "BL-Sp2", "model": "overlay", "sensors": ["split2_upper", "split2_lower"]},
+        {"name": "ED-Sp2", "model": "ed", "sensors": ["split2_upper", "split2_lower"]},
+    ]
+    record = run(rows, logs, out)
+    assert [row.failure for row in record.rows] == [None] * 4
+    assert results.read_run(out) == record
+    assert {log.split for log in record.logs} == {"train", "val"}
+    for row in record.rows:
+        folder = results.result_folder(out, row.results[0])
+        result = results.read_result(folder)
+        assert [window.recording for window in result.windows] == ["toy_000002_000000", "toy_000003_000000"]
+        assert {window.target_frame for window in result.windows} == {8}
+        windows = results.read_arrays(results.windows_file(out, result.windows_id), ("inputs", "target", "mask"))
+        assert windows["inputs"].shape == (2, len(row.sensors), 2, 128, 128)
+        predictions = results.read_arrays(folder / "predictions.npz", ("prediction", "certainty"))
+        counts = results.read_counts(folder)
+        for n in range(2):
+            scored = ~windows["mask"][n]
+            for class_id in range(len(CLASS_NAMES)):
+                target = windows["target"][n][scored] == class_id
+                predicted = predictions["prediction"][n][scored] == class_id
+                assert counts[n, class_id, class_id] == (target & predicted).sum()
+                assert counts[n, class_id].sum() == target.sum()
+    history = results.read_history(results.result_folder(out, record.rows[3].results[0]))
+    assert list(history["epoch"]) == [1, 2]
+    assert history["validation_loss"].notna().all()
+
+
+def test_a_second_start_does_nothing_and_a_lost_result_is_made_again_alike(logs, tmp_path):
+    out = tmp_path / "run"
+    rows = [{"name": "BL-DC", "model": "newest"}, {"name": "ED-DC", "model": "ed"}]
+    record = run(rows, logs, out)
+    folder = results.result_folder(out, record.rows[1].results[0])
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file() and path.name != "run.json"}
+    run(rows, logs, out)
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+    counts, text = (folder / "counts.npz").read_bytes(), json.loads((folder / "result.json").read_text())
+    (folder / "counts.npz").write_bytes(counts[:100])
+    run(rows, logs, out)
+    assert (folder / "counts.npz").read_bytes() == counts
+    again = json.loads((folder / "result.json").read_text())
+    del text["predict_seconds"], again["predict_seconds"]
+    assert text == again
+
+
+def test_rows_that_mean_the_same_share_training_and_result(logs, tmp_path):
+    rows = [{"name": "ED-DC", "model": "ed", "repeats": 2}, {"name": "ED-SL2", "model": "ed", "repeats": 2}]
+    record = run(rows, logs, tmp_path / "run")
+    assert record.rows[0].results == record.rows[1].results
+    assert len(set(record.rows[0].results)) == 2
+    assert len(list((tmp_path / "run" / "trainings").iterdir())) == 2
+
+
+def test_a_row_that_fails_is_noted_and_the_others_go_on(logs, tmp_path):
+    rows = [
+        {"name": "ED-far", "model": "ed", "window": {"horizon_steps": 9, "target_frame": 100}},
+        {"name": "BL-none", "model": "newest", "validation_split": "test"},
+        {"name": "own", "model": f"{tmp_path}/missing.py:Model"},
+        {"name": "BL-DC", "model": "newest"},
+    ]
+    record = run(rows, logs, tmp_path / "run")
+    reasons = {row.name: row.failure for row in record.rows}
+    assert "9" in reasons["ED-far"]
+    assert reasons["BL-none"] == "no recording of split 'test' gave grids (splits found: train, val)"
+    assert re.search(r"missing\.py: cannot be read", reasons["own"])
+    assert reasons["BL-DC"] is None
+    assert results.read_run(tmp_path / "run") == record
+
+
+def test_a_model_of_ones_own_is_scored_like_any_other(logs, tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "import torch\n"
+        "class Newest:\n"
+        "    def __call__(self, batch):\n"
+        "        return torch.nn.functional.one_hot(batch.past[:, 0, -1].long(), 10).permute(0, 3, 1, 2).float()\n"
+    )
+    rows = [{"name": "mine", "model": f"{tmp_path}/mine.py:Newest"}, {"name": "BL-DC", "model": "newest"}]
+    record = run(rows, logs, tmp_path / "run")
+    assert score(tmp_path / "run", record, "mine") == score(tmp_path / "run", record, "BL-DC")
+
+
+def test_predictions_of_a_perfect_past_are_certain(logs, tmp_path):
+    record = run([{"name": "BL-DC", "model": "newest"}], logs, tmp_path / "run")
+    folder = results.result_folder(tmp_path / "run", record.rows[0].results[0])
+    certainty = results.read_arrays(folder / "predictions.npz", ("certainty",))["certainty"]
+    assert (np.asarray(certainty) == 255).all()
