@@ -11,7 +11,7 @@ import torch
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file, write_text
-from semgrid_eval.models.network import EncoderDecoder, load_network, read_notes, save_network
+from semgrid_eval.models.network import EncoderDecoder, load_network, read_header, save_network
 
 WEIGHTS_FILE = "weights.safetensors"
 HISTORY_FILE = "history.csv"
@@ -45,7 +45,7 @@ class TrainingFolder:
         weights = self._path / WEIGHTS_FILE
         if not weights.is_file():
             return False
-        self._check_key(read_notes(weights).get("training"), weights)
+        self._check_key(read_header(weights).get("training"), weights)
         return True
 
     def read(self, device: torch.device) -> tuple[EncoderDecoder, list[EpochRecord]]:

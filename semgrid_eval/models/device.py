@@ -13,6 +13,7 @@ from semgrid_eval.errors import ConfigError
 
 Precision = Literal["auto", "float32", "bf16"]
 
+_DEVICE_TYPES = ("cpu", "cuda", "mps")
 _CPU_FLAGS = Path("/proc/cpuinfo")
 _BF16_FLAGS = {"avx512_bf16", "amx_bf16"}
 # Parameters of glibc's mallopt and values that make it keep and re-use its memory.
@@ -30,8 +31,10 @@ def choose_device(name: str = "auto") -> torch.device:
     try:
         device = torch.device(name)
         torch.empty(1, device=device)
-    except (RuntimeError, AssertionError):
-        raise ConfigError(f"no device {name!r} here; auto, cpu and cuda are known names", field="device") from None
+    except (RuntimeError, AssertionError, ImportError):
+        device = None
+    if device is None or device.type not in _DEVICE_TYPES:
+        raise ConfigError(f"no device {name!r} here; auto, cpu and cuda are known names", field="device")
     return device
 
 

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import torch
 from pydantic import Field, field_validator
@@ -21,6 +21,7 @@ from semgrid_eval.sequences.dataset import WindowBatch
 Preset = Literal["keras", "torch"]
 Activation = Literal["linear", "relu"]
 DROPOUT_RATE = 0.5
+_HEADER = "semgrid_eval"
 
 
 class NetworkConfig(Config):
@@ -125,15 +126,17 @@ def check_grid_size(config: NetworkConfig, rows: int, columns: int) -> None:
     """
     factor = 2 ** (config.depth - 1)
     if rows % factor or columns % factor:
-        raise ConfigError(f"{config.depth} needs grids of a multiple of {factor} cells, not {rows} x {columns}")
+        raise ConfigError(f"depth {config.depth} needs grids of a multiple of {factor} cells, not {rows} x {columns}")
 
 
 def save_network(network: EncoderDecoder, path: Path, **notes: str) -> None:
-    """Write weights as safetensors, with all that `load_network` needs and `notes` in the file's header."""
-    header = {"config": network.config.model_dump(), "grids": network.grids, "preset": network.preset}
+    """Write weights as safetensors; the header has all that `load_network` needs, and `notes`."""
+    header = {"config": network.config.model_dump(), "grids": network.grids, "preset": network.preset, **notes}
     tensors = {name: value.detach().cpu().contiguous() for name, value in network.state_dict().items()}
+    # One entry, because safetensors writes several in an order that changes from time to time.
+    content = save(tensors, metadata={_HEADER: json.dumps(header, sort_keys=True)})
     with atomic_file(path) as stream:
-        stream.write(save(tensors, metadata={"network": json.dumps(header, sort_keys=True), **notes}))
+        stream.write(content)
 
 
 def load_network(path: Path, device: torch.device | None = None) -> EncoderDecoder:
@@ -142,29 +145,30 @@ def load_network(path: Path, device: torch.device | None = None) -> EncoderDecod
     Raises:
         InputError: the file is missing, damaged or not of this kind.
     """
+    header = read_header(path)
     try:
-        header = json.loads(read_notes(path)["network"])
-        network = EncoderDecoder(
-            parse_config(NetworkConfig, header["config"], path=path), grids=header["grids"], preset=header["preset"]
-        )
+        config = parse_config(NetworkConfig, header["config"], path=path)
+        network = EncoderDecoder(config, grids=header["grids"], preset=header["preset"])
         with safe_open(path, framework="pt") as archive:
             network.load_state_dict({name: archive.get_tensor(name) for name in archive.keys()})  # noqa: SIM118
-    except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError) as error:
+    except (KeyError, TypeError, RuntimeError) as error:
         raise InputError(f"holds no network of this version: {error}", path=path) from error
     return network.to(device or torch.device("cpu")).eval()
 
 
-def read_notes(path: Path) -> dict[str, str]:
-    """Read the header of a safetensors file.
+def read_header(path: Path) -> dict[str, Any]:
+    """Read what `save_network` wrote beside the weights.
 
     Raises:
-        InputError: the file is missing or damaged.
+        InputError: the file is missing, damaged or not of this kind.
     """
     try:
         with safe_open(path, framework="pt") as archive:
-            return dict(archive.metadata() or {})
+            return dict(json.loads((archive.metadata() or {})[_HEADER]))
     except (OSError, SafetensorError) as error:
         raise InputError(f"cannot be read: {error}", path=path) from error
+    except (KeyError, TypeError, ValueError):
+        raise InputError("holds no network of this version", path=path) from None
 
 
 class _Block(nn.Sequential):

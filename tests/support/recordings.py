@@ -18,6 +18,7 @@ def recording(
         name=name,
         log=f"{name}.mcap",
         digest=f"digest of {name}",
+        dataset="synthetic",
         split="train",
         sensors=sensors,
         stamps_ns=np.arange(frames, dtype=np.int64) * FRAME_NS,

@@ -1,0 +1,62 @@
+"""Device and precision by name, and seeds that leave no trace."""
+
+import pytest
+import torch
+
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.models import device as device_module
+from semgrid_eval.models.device import choose_device, choose_precision, cpu_has_bf16, keep_freed_memory, seeded
+
+CPU = torch.device("cpu")
+
+
+def test_auto_takes_cuda_where_there_is_one():
+    assert choose_device("auto").type == ("cuda" if torch.cuda.is_available() else "cpu")
+    assert choose_device("cpu") == CPU
+
+
+@pytest.mark.parametrize("name", ["gpu", "cuda:99", "hpu", "meta"])
+def test_device_that_is_not_there_is_a_config_error(name):
+    with pytest.raises(ConfigError, match=f"device: no device '{name}' here"):
+        choose_device(name)
+
+
+def test_asked_precision_is_taken_and_auto_follows_the_cpu():
+    assert choose_precision("float32", CPU) == torch.float32
+    assert choose_precision("bf16", CPU) == torch.bfloat16
+    assert choose_precision("auto", CPU) == (torch.bfloat16 if cpu_has_bf16() else torch.float32)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("flags\t\t: fpu avx512_bf16 x\n", True),
+        ("flags : fpu amx_bf16\n", True),
+        ("flags : avx512f\n", False),
+        ("", False),
+    ],
+)
+def test_bf16_is_read_from_the_cpus_flags(tmp_path, monkeypatch, text, expected):
+    (tmp_path / "cpuinfo").write_text(text)
+    monkeypatch.setattr(device_module, "_CPU_FLAGS", tmp_path / "cpuinfo")
+    assert cpu_has_bf16.__wrapped__() is expected
+
+
+def test_system_without_cpu_flags_has_no_bf16(tmp_path, monkeypatch):
+    monkeypatch.setattr(device_module, "_CPU_FLAGS", tmp_path / "none")
+    assert cpu_has_bf16.__wrapped__() is False
+
+
+def test_seeded_block_repeats_and_leaves_the_generator_as_it_was():
+    state = torch.get_rng_state()
+    with seeded(5, CPU):
+        first = torch.rand(3)
+    with seeded(5, CPU):
+        assert torch.equal(torch.rand(3), first)
+    assert torch.equal(torch.get_rng_state(), state)
+
+
+def test_keeping_memory_changes_no_result():
+    before = torch.ones(1 << 20).sum()
+    keep_freed_memory()
+    assert torch.ones(1 << 20).sum() == before
