@@ -1,5 +1,6 @@
 """What the commands show: progress bars on a terminal, plain lines elsewhere, always on stderr."""
 
+import shlex
 import sys
 import time
 from collections.abc import Iterator
@@ -25,6 +26,11 @@ PLAIN_LINE_INTERVAL_S = 10.0
 def say(text: str) -> None:
     """Print one line of status on stderr."""
     click.echo(text, err=True)
+
+
+def command_line() -> str:
+    """Return the command line as a user would type it again."""
+    return shlex.join(["semgrid-eval", *sys.argv[1:]])
 
 
 @contextmanager

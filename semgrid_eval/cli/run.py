@@ -1,18 +1,11 @@
 """`semgrid-eval run`: work off an experiment matrix."""
 
 import os
-import shlex
-import sys
 from pathlib import Path
 
 import click
 
-from semgrid_eval.cli.console import progress, say
-
-
-def command_line() -> str:
-    """Return the command line as a user would type it again."""
-    return shlex.join(["semgrid-eval", *sys.argv[1:]])
+from semgrid_eval.cli.console import command_line, progress, say
 
 
 @click.command("run", epilog="Example: semgrid-eval run baselines --logs logs --out runs/first")

@@ -1,0 +1,41 @@
+"""`semgrid-eval demo`: from a simulated town to a report, with nothing to prepare."""
+
+import os
+import time
+from pathlib import Path
+
+import click
+
+from semgrid_eval.cli.console import command_line, progress, say
+
+PRESET = "demo"
+
+
+@click.command("demo", epilog="Example: semgrid-eval demo --out demo")
+@click.option("--out", default="demo", show_default=True, type=click.Path(path_type=Path, file_okay=False))
+@click.option("--recordings", type=click.IntRange(4, 10_000), default=80, show_default=True, help="Drives to simulate.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
+@click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
+@click.option("--workers", type=click.IntRange(1, 256), default=os.cpu_count() or 1, help="Processes at once.")
+def command(out: Path, recordings: int, seed: int, device: str, workers: int) -> int:
+    """Simulate a town, record drives through it as logs, train, score and report: a few minutes on two cores.
+
+    Prints the path of the finished page. What is done already is kept, so the same command goes on after a stop.
+    """
+    from semgrid_eval.cli.convert_synthetic import convert
+    from semgrid_eval.report.page import write_report
+    from semgrid_eval.runs.matrix import load_matrix
+    from semgrid_eval.runs.runner import RunOptions, run_matrix
+
+    start_s = time.monotonic()
+    logs, run = out / "logs", out / "run"
+    summary = convert(logs, recordings=recordings, seed=seed, workers=workers)
+    options = RunOptions(device=device, workers=workers, grids=out / "grids", command=command_line())
+    record = run_matrix(load_matrix(PRESET), logs, run, options, stage=progress)
+    page = write_report(run)
+    for row in record.rows:
+        if row.failure:
+            say(f"Error: row {row.name}: {row.failure}")
+    say(f"Finished in {time.monotonic() - start_s:.0f} s. Open this page in a browser:")
+    click.echo(page)
+    return 1 if summary.failed or record.failed_logs or any(row.failure for row in record.rows) else 0
