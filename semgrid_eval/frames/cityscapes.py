@@ -31,6 +31,7 @@ from semgrid_eval.frames.cityscapes_sequence import CityscapesSequence, Sequence
 RECORDING_FRAMES = 30
 CAMERA_NAME = "front"
 _IMAGES = "leftImg8bit_sequence"
+_CAMERA_NAME = re.compile(r"[A-Za-z0-9_-]+")
 _IMAGE_NAME = re.compile(r"(?P<sequence>.+_[0-9]+)_(?P<number>[0-9]+)_leftImg8bit\.png")
 
 
@@ -52,8 +53,10 @@ def find_sequences(
         camera_name: what the camera shall be called.
 
     Raises:
-        InputError: there is no such folder or split, or no sequence in it.
+        InputError: there is no such folder or split, no sequence in it, or the camera cannot be called so.
     """
+    if not _CAMERA_NAME.fullmatch(camera_name):
+        raise InputError(f"{camera_name!r} is no name of letters, digits, _ and -", field="camera name")
     root = src / _IMAGES
     if not root.is_dir():
         raise InputError("is no folder; a Cityscapes sequence tree has one", path=root)

@@ -169,8 +169,10 @@ class Container:
         if summary_crc and zlib.crc32(summary[: -len(MAGIC) - 4]) != summary_crc:
             raise McapError("the checksum of its index does not match")
         self.summary = _parse_summary(summary)
-        if self.summary.statistics is None or self.summary.statistics.chunk_count != len(self.summary.chunk_indexes):
+        statistics = self.summary.statistics
+        if statistics is None or statistics.chunk_count != len(self.summary.chunk_indexes):
             raise McapError("its index is incomplete")
+        self.message_count = statistics.message_count
 
     def _channel_ids(self, topics: Iterable[str] | None) -> Collection[int]:
         if topics is None:

@@ -181,6 +181,35 @@ class LogReader:
         """
         self._container.verify_data()
 
+    @property
+    def has_checksums(self) -> bool:
+        """Whether the writer gave checksums of data and index, so that any damage is seen."""
+        return self._container.has_checksums
+
+    def schemas(self) -> dict[str, str]:
+        """Return the name of the message type by topic."""
+        summary = self._container.summary
+        return {
+            channel.topic: summary.schemas[channel.schema_id].name if channel.schema_id in summary.schemas else ""
+            for channel in summary.channels.values()
+        }
+
+    def stamps_ns(self) -> dict[str, list[int]]:
+        """Return the times of all messages by topic, ascending; this reads the whole file.
+
+        Raises:
+            LogError: what is read is damaged, or the index tells another number of messages.
+        """
+        found: dict[str, list[int]] = {topic: [] for topic in self.schemas()}
+        for entry in self._container.entries():
+            found[self._topic(entry)].append(entry.log_ns)
+        count = sum(len(stamps) for stamps in found.values())
+        if count != self._container.message_count:
+            raise LogError(
+                f"holds {count} messages, but its index tells {self._container.message_count}", path=self.path
+            )
+        return found
+
     def calibration(self, camera: str) -> CameraCalibration:
         """Return the calibration of a camera.
 

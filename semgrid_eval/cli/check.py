@@ -1,0 +1,56 @@
+"""`semgrid-eval check`: is a log whole and plausible?"""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+from semgrid_eval.cli.console import progress, say
+from semgrid_eval.log.check import LogReport, check_log
+from semgrid_eval.log.store import find_logs
+
+
+@click.command("check", epilog="Example: semgrid-eval check logs")
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True))
+@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+def command(logs: tuple[Path, ...], *, as_json: bool) -> int:
+    """Check logs: every LOG that is a file, and all logs below every LOG that is a folder.
+
+    Looks at all checksums, channels, counts and time stamps (repeated, gaps, jitter), at the plausibility of
+    calibration and motion, and decodes every label and disparity image. One line a finding; the exit code is 1 if any
+    is an error.
+    """
+    paths = list(_files(logs))
+    reports: list[LogReport] = []
+    with progress("check") as watch:
+        for path in paths:
+            reports.append(check_log(path))
+            watch(len(reports), len(paths), path.name)
+    if as_json:
+        click.echo(json.dumps([_as_json(report) for report in reports], indent=2))
+    else:
+        for report in reports:
+            for finding in report.findings:
+                click.echo(f"{report.path}: {finding}")
+    bad = sum(not report.good for report in reports)
+    say(f"{len(reports)} logs checked, {bad} with errors")
+    return 1 if bad else 0
+
+
+def _files(logs: tuple[Path, ...]) -> Iterator[Path]:
+    for path in logs:
+        yield from find_logs(path) if path.is_dir() else [path]
+
+
+def _as_json(report: LogReport) -> dict[str, object]:
+    return {
+        "log": str(report.path),
+        "good": report.good,
+        "duration_s": report.duration_s,
+        "messages": report.counts,
+        "findings": [
+            {"severity": finding.severity.value, "place": finding.place, "message": finding.message}
+            for finding in report.findings
+        ],
+    }
