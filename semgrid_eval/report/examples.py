@@ -76,9 +76,10 @@ def choose(contest: Contest, *, best: int, worst: int) -> list[Pick]:
     gaps = rule_values(contest)
     values = _mean_finite(gaps[:, [i for i in range(CLASS_COUNT) if i != UNKNOWN]])
     order = _ordered(values)
-    top = [Pick(int(i), "mean over classes, largest", float(values[i])) for i in order[:best]]
-    left = order[len(top) :][::-1]
-    return top + [Pick(int(i), "mean over classes, smallest", float(values[i])) for i in left[:worst]]
+    top = _of_other_recordings(contest.result, order, best)
+    left = _of_other_recordings(contest.result, order[~np.isin(order, top)][::-1], worst)
+    picks = [(i, "Largest over all classes") for i in top] + [(i, "Smallest over all classes") for i in left]
+    return [Pick(i, reason, float(values[i])) for i, reason in picks]
 
 
 def choose_by_class(contest: Contest) -> list[Pick]:
@@ -87,7 +88,7 @@ def choose_by_class(contest: Contest) -> list[Pick]:
     for index, name in enumerate(CLASS_NAMES):
         order = _ordered(gaps[:, index]) if index != UNKNOWN else np.zeros(0, np.intp)
         ends = [(order[0], "largest"), (order[-1], "smallest")] if len(order) > 1 else [(i, "only") for i in order]
-        label = name.replace("_", " ")
+        label = name.replace("_", " ").capitalize()
         picks += [Pick(int(i), f"{label}, {end}", float(gaps[i, index])) for i, end in ends]
     return picks
 
@@ -141,6 +142,14 @@ def _ordered(values: Array) -> NDArray[np.intp]:
     """Order the windows that have a value, largest first, ties in the order of the windows."""
     order = np.argsort(-values, kind="stable")
     return order[np.isfinite(values[order])]
+
+
+def _of_other_recordings(result: Result, order: NDArray[np.intp], count: int) -> list[int]:
+    """Take the first windows of an order, one of each recording, so that examples show different scenes."""
+    taken: dict[str, int] = {}
+    for i in order.tolist():
+        taken.setdefault(result.record.windows[i].recording, i)
+    return list(taken.values())[:count]
 
 
 def _mean_finite(values: Array) -> Array:

@@ -26,6 +26,7 @@ class Picture:
     title: str
     alt: str
     uri: str
+    step: bool = False  # whether it belongs to the way from the inputs over the target to the prediction
 
 
 @dataclass(frozen=True)
@@ -83,10 +84,10 @@ def _pictures(contest: Contest, grids: dict[str, NDArray[np.generic]], rivals: d
     for t in range(steps):
         for s in range(sensors):
             title = f"Input {t + 1} of {steps}" + (f", {_sensor(contest, s)}" if sensors > 1 else "")
-            yield Picture(title, f"{title}, aligned to the target", data_uri(grid_png(inputs[s, t])))
-    yield Picture("Target", "Target grid with mask M in white", data_uri(grid_png(target, mask)))
+            yield Picture(title, f"{title}, aligned to the target", data_uri(grid_png(inputs[s, t])), step=True)
+    yield Picture("Target", "Target grid with mask M in white", data_uri(grid_png(target, mask)), step=True)
     name = contest.model.name
-    yield Picture(name, f"Prediction of {name}", data_uri(grid_png(prediction)))
+    yield Picture(name, f"Prediction of {name}", data_uri(grid_png(prediction)), step=True)
     for rival, grid in rivals.items():
         yield Picture(rival, f"Prediction of {rival}", data_uri(grid_png(grid)))
     for rival, grid in list(rivals.items())[:1]:

@@ -62,7 +62,8 @@ class Plot:
         """The SVG with colours that follow the reader's light or dark setting, and without a background."""
         light = "".join(f"--c{i}:{colour};" for i, colour in enumerate(_DARK))
         dark = "".join(f"--c{i}:{colour};" for i, colour in enumerate(_DARK.values()))
-        style = f"<style>:root{{{light}}}@media (prefers-color-scheme:dark){{:root{{{dark}}}}}#patch_1{{display:none}}</style>"
+        media = f"@media (prefers-color-scheme:dark){{:root{{{dark}}}}}"
+        style = f"<style>:root{{{light}}}{media}#patch_1{{display:none}}</style>"
         text = self.svg
         for i, colour in enumerate(_DARK):
             text = text.replace(colour, f"var(--c{i})")
@@ -200,6 +201,8 @@ def _curve(history: Any, column: str) -> list[float]:  # noqa: ANN401 - a data f
 
 
 def _short(name: str) -> str:
+    """Cut a name to what fits under a bar; control characters, which XML forbids, become spaces."""
+    name = "".join(character if character.isprintable() else " " for character in name)
     return name if len(name) <= _NAME_CHARACTERS else f"{name[: _NAME_CHARACTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
 
 

@@ -105,6 +105,8 @@ def _load_row(run: Path, row: RowRecord, name: str) -> Row:
             failures.append(str(error))
     if not row.results and row.failure is None:
         failures.append("it has no result")
+    if found and not any(len(result.counts) for result in found):
+        failures.append("it has no window to score")
     return Row(name, row, tuple(sorted(found, key=lambda result: result.seed)), tuple(failures), run)
 
 

@@ -1,0 +1,29 @@
+from pathlib import Path
+
+import pytest
+from support.fake_run import make_fake_run
+
+from semgrid_eval.cli.main import main
+
+
+def _run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stop:
+        main([str(argument) for argument in arguments])
+    printed = capsys.readouterr()
+    return stop.value.code, printed.out, printed.err
+
+
+def test_report_prints_the_page_alone_on_stdout(tmp_path, capsys):
+    run = make_fake_run(tmp_path / "run", recordings=2, windows=1)
+    code, out, err = _run(capsys, "report", run, "--out", tmp_path / "page")
+    assert code == 0
+    assert Path(out.strip()) == tmp_path / "page" / "index.html"
+    assert Path(out.strip()).is_file()
+    assert "reading results: 7/7" in err
+
+
+def test_report_of_no_run_is_one_line(tmp_path, capsys):
+    code, out, err = _run(capsys, "report", tmp_path)
+    assert (code, out) == (1, "")
+    assert err.count("\n") == 1
+    assert str(tmp_path) in err

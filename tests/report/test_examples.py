@@ -1,0 +1,137 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.fake_run import FakeRow, make_fake_run
+
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
+from semgrid_eval.report.comparison import headline
+from semgrid_eval.report.estimates import score_rows
+from semgrid_eval.report.examples import MIN_CELLS, Contest, choose, choose_by_class, contests, rule_values
+from semgrid_eval.report.panels import example_windows, shown_time
+from semgrid_eval.report.reading import load_runs
+
+CAR, ROAD = CLASS_NAMES.index("car"), CLASS_NAMES.index("road")
+
+
+def _rows(run):
+    return {row.name: row for row in load_runs([run])[0].rows}
+
+
+def _with_counts(row, counts):
+    """Give a row's first result other counts, and as many windows, each of a recording of its own."""
+    result = row.results[0]
+    windows = tuple(
+        result.record.windows[0].model_copy(update={"recording": f"r{i}", "target_frame": i})
+        for i in range(len(counts))
+    )
+    record = result.record.model_copy(update={"windows": windows})
+    return replace(row, results=(replace(result, counts=np.array(counts, np.int32), record=record),))
+
+
+def _car(hits, cells=100):
+    counts = np.zeros((CLASS_COUNT, CLASS_COUNT), int)
+    counts[CAR, CAR], counts[CAR, ROAD] = hits, cells - hits
+    return counts
+
+
+def test_the_rule_is_the_smaller_of_both_leads(run):
+    rows = _rows(run)
+    model = _with_counts(rows["ED-DC"], [_car(80), _car(50), _car(60)])
+    dc = _with_counts(rows["BL-DC"], [_car(30), _car(70), _car(20)])
+    nt = _with_counts(rows["BL-NT"], [_car(60), _car(10), _car(10)])
+    contest = Contest(model, (dc, nt))
+    assert rule_values(contest)[:, CAR] == pytest.approx([0.2, -0.2, 0.4])
+    assert [pick.index for pick in choose(contest, best=2, worst=1)] == [2, 0, 1]
+    by_class = {pick.reason: pick.index for pick in choose_by_class(contest)}
+    assert by_class == {"Car, largest": 2, "Car, smallest": 1}
+
+
+def test_a_class_with_few_cells_does_not_count(run):
+    rows = _rows(run)
+    model = _with_counts(rows["ED-DC"], [_car(MIN_CELLS - 1, MIN_CELLS - 1), _car(MIN_CELLS, MIN_CELLS)])
+    values = rule_values(Contest(model, ()))
+    assert np.isnan(values[0, CAR])
+    assert values[1, CAR] == 1.0
+
+
+def test_windows_are_compared_by_target_frame_whatever_their_order(run):
+    rows = _rows(run)
+    rival = rows["BL-DC"]
+    flipped = replace(
+        rival.results[0],
+        counts=rival.results[0].counts[::-1],
+        record=rival.results[0].record.model_copy(update={"windows": rival.results[0].record.windows[::-1]}),
+    )
+    straight = rule_values(Contest(rows["ED-DC"], (rival,)))
+    turned = rule_values(Contest(rows["ED-DC"], (replace(rival, results=(flipped,)),)))
+    np.testing.assert_array_equal(straight, turned)
+
+
+def test_examples_are_of_different_recordings(run):
+    rows = _rows(run)
+    contest = Contest(rows["ED-DC"], (rows["BL-DC"], rows["BL-NT"]))
+    picks = choose(contest, best=3, worst=3)
+    recordings = [contest.result.record.windows[pick.index].recording for pick in picks]
+    assert len(set(recordings[:3])) == len(set(recordings[3:])) == 3
+    scores = [pick.score for pick in picks]
+    assert scores[:3] == sorted(scores[:3], reverse=True)
+    assert scores[3:] == sorted(scores[3:])
+
+
+def test_the_papers_contest_comes_first_and_others_follow(run):
+    rows = list(_rows(run).values())
+    found = headline(score_rows(rows, np.random.default_rng(0), draws=2))
+    got = contests([row for row in rows if row.windows], found)
+    assert [(c.model.name, [r.name for r in c.rivals]) for c in got] == [
+        ("ED-DC", ["BL-DC", "BL-NT"]),
+        ("ED-Sp2", ["BL-Sp2"]),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("rows", "model", "rivals"),
+    [
+        ((FakeRow("DC", "BL"),), "BL-DC", []),
+        ((FakeRow("DC", "BL"), FakeRow("NT", "BL", translate=False)), "BL-DC", ["BL-NT"]),
+        ((FakeRow("Sp2", "ED", 0.1, 1), FakeRow("Sp2", "BL")), "ED-Sp2", ["BL-Sp2"]),
+    ],
+)
+def test_other_runs_get_a_sensible_contest(tmp_path, rows, model, rivals):
+    loaded = load_runs([make_fake_run(tmp_path / "run", rows=rows, recordings=3)])[0].rows
+    first = contests(loaded, headline(score_rows(loaded, np.random.default_rng(0), draws=2)))[0]
+    assert (first.model.name, [rival.name for rival in first.rivals]) == (model, rivals)
+
+
+def test_an_example_shows_inputs_target_predictions_and_certainty(run):
+    rows = _rows(run)
+    contest = Contest(rows["ED-Sp2"], (rows["BL-Sp2"],))
+    windows, problem = example_windows(contest, choose(contest, best=1, worst=0))
+    assert problem == ""
+    titles = [picture.title for picture in windows[0].pictures]
+    assert titles == [
+        "Input 1 of 2, lower",
+        "Input 1 of 2, upper",
+        "Input 2 of 2, lower",
+        "Input 2 of 2, upper",
+        "Target",
+        "ED-Sp2",
+        "BL-Sp2",
+        "Who is right",
+        "Certainty",
+    ]
+
+
+def test_lost_arrays_are_told_not_raised(tmp_path):
+    run = make_fake_run(tmp_path / "run", recordings=2, windows=1)
+    rows = _rows(run)
+    contest = Contest(rows["ED-DC"], (rows["BL-DC"],))
+    (rows["ED-DC"].results[0].folder / "predictions.npz").unlink()
+    windows, problem = example_windows(contest, choose(contest, best=1, worst=1))
+    assert windows == []
+    assert "predictions.npz" in problem
+
+
+def test_times_are_dates_only_where_the_stamp_is_one():
+    assert shown_time(1_234_567_890) == "1.235 s"
+    assert shown_time(1_500_000_000_250_000_000) == "2017-07-14 02:40:00.250 UTC"

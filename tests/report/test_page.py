@@ -1,0 +1,213 @@
+import filecmp
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+
+import pandas as pd
+import pytest
+from support.fake_run import FakeRow, make_fake_run
+
+from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.errors import InputError, ResultError
+from semgrid_eval.files import read_json
+from semgrid_eval.report.page import write_report
+from semgrid_eval.scores.results import read_run, write_run
+
+VOID = {"meta", "link", "img", "input", "br"}
+
+
+class _Page(HTMLParser):
+    """Collects what a test asks for and insists that every element is closed where it should be."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.words = [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] not in ("script", "style"):
+            self.words.append(data)
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.tags if name == tag]
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.words).split())
+
+
+def _read(path):
+    return _Page(path.read_text(encoding="utf-8"))
+
+
+def _report_of(tmp_path, **kwargs):
+    return write_report(make_fake_run(tmp_path / "run", recordings=2, windows=1, **kwargs))
+
+
+def test_the_page_answers_in_order(page):
+    titles = [a["id"] for a in _read(page).all("section")]
+    assert titles[:3] == ["summary", "categories", "classes"]
+    assert titles[-3:] == ["examples", "failures", "provenance"]
+
+
+def test_the_page_is_well_formed_and_accessible(page):
+    found = _read(page)
+    assert found.all("html") == [{"lang": "en"}]
+    assert all(image["alt"] for image in found.all("img"))
+    assert all(image["src"].startswith("data:image/") for image in found.all("img"))
+    ids = [a["id"] for _, a in found.tags if "id" in a]
+    assert len(ids) == len(set(ids))
+    assert {a["href"][1:] for a in found.all("a")} <= set(ids)
+    assert len(found.all("caption")) == len(found.all("table"))
+    assert all(a.get("scope") in ("col", "row") for a in found.all("th"))
+
+
+def test_the_page_needs_no_network(page):
+    text = re.sub(r'"data:[^"]*"', '""', page.read_text(encoding="utf-8"))
+    assert not re.search(r"(src|href)=\"(?!#|\")", text)
+    assert not re.search(r"@import|url\(|https?:", text)
+
+
+def test_three_example_windows_and_their_traces_are_shown(page):
+    found = _read(page)
+    assert [a["class"] for a in found.all("article")].count("window") >= 3
+    for words in ("Input 1 of 2", "Target", "BL-NT", "Certainty", "frame 20", "log town_00"):
+        assert words in found.text
+
+
+def test_failures_and_provenance_are_told(page):
+    text = _read(page).text
+    for words in (
+        "row ED-NT the loss became not a number in epoch 3",
+        "log logs/town_broken.mcap the index is missing",
+        "semgrid-eval run smoke --logs logs --out run",
+        "5 min 12 s",
+        "two shared cores",
+    ):
+        assert words in text
+
+
+def test_the_tables_hold_the_numbers_of_the_long_form(page):
+    classes = pd.read_csv(page.parent / "classes.csv")
+    row = classes[(classes.experiment == "DC") & (classes.model == "ED") & (classes["class"] == "car")]
+    assert f"{row.iou.mean():.3f}" in _read(page).text
+
+
+def test_files_beside_the_page_are_there(page):
+    names = {str(path.relative_to(page.parent)) for path in page.parent.rglob("*") if path.is_file()}
+    assert {"index.html", "classes.csv", "categories.csv", "summary.csv", "summary.md", "summary.tex"} <= names
+    for name in ("categories", "category_static", "training"):
+        assert {f"figures/{name}.png", f"figures/{name}.svg"} <= names
+
+
+def test_the_same_run_gives_the_same_bytes(run, page, tmp_path):
+    again = write_report(run, tmp_path / "again").parent
+    names = [str(path.relative_to(again)) for path in again.rglob("*") if path.is_file()]
+    assert filecmp.cmpfiles(page.parent, again, names, shallow=False) == (names, [], [])
+
+
+def test_the_default_place_is_in_the_run_and_is_replaced(tmp_path):
+    first = _report_of(tmp_path, rows=(FakeRow("DC", "BL"),))
+    assert first == tmp_path / "run" / "report" / "index.html"
+    (first.parent / "old.txt").touch()
+    write_report(tmp_path / "run")
+    assert not (first.parent / "old.txt").exists()
+
+
+def test_a_folder_that_is_no_report_is_left_alone(run, tmp_path):
+    (tmp_path / "thesis.tex").write_text("precious")
+    with pytest.raises(InputError, match="no report"):
+        write_report(run, tmp_path)
+    assert (tmp_path / "thesis.tex").read_text() == "precious"
+
+
+def test_a_folder_without_a_run_is_named(tmp_path):
+    with pytest.raises(ResultError, match=re.escape(str(tmp_path))):
+        write_report(tmp_path)
+
+
+def test_failed_rows_only(tmp_path):
+    page = _report_of(tmp_path, rows=(FakeRow("DC", "ED", failure="out of memory"),))
+    text = _read(page).text
+    assert "No row has a score" in text
+    assert "row ED-DC out of memory" in text
+    assert pd.read_csv(page.parent / "classes.csv").empty
+
+
+def test_one_row_only(tmp_path):
+    text = _read(_report_of(tmp_path, rows=(FakeRow("DC", "BL"),))).text
+    assert "BL-DC predicts best" in text
+    assert "no other kind of model to compare with" in text
+    assert "No row was trained" in text
+
+
+def test_zero_windows(tmp_path):
+    page = write_report(make_fake_run(tmp_path / "run", recordings=0))
+    text = _read(page).text
+    assert "No row has a score" in text
+    assert "row BL-DC it has no window to score" in text
+
+
+def test_a_class_in_neither_target_nor_prediction_is_a_dash_and_empty(tmp_path):
+    run = make_fake_run(tmp_path / "run", rows=(FakeRow("DC", "BL"),), recordings=1, windows=1)
+    page = write_report(run)
+    classes = pd.read_csv(page.parent / "classes.csv").set_index("class")
+    absent = [name for name in CLASS_NAMES if pd.isna(classes.iou[name])]
+    assert absent
+    assert (classes.cells[absent] == 0).all()
+    assert "\N{EN DASH}" in _read(page).text
+    assert read_json(page.parent / "report.json")["rows"]["BL-DC"]["scores"][absent[0]]["value"] is None
+
+
+def test_a_damaged_result_fails_its_row_and_the_rest_goes_on(tmp_path):
+    run = make_fake_run(tmp_path / "run", recordings=2, windows=1)
+    victim = read_run(run).rows[0].results[0]
+    (run / "results" / victim / "counts.npz").write_bytes(b"not a zip")
+    text = _read(write_report(run)).text
+    assert f"{victim}/counts.npz" in text
+    assert "ED-DC predicts best" in text
+
+
+HOSTILE = ("<script>alert(1)</script>", "\"quoted\" & 'more'", "{{ 7 * 7 }} $x_1$ \\frac", "n" * 10_000)
+
+
+def test_names_are_shown_as_text(tmp_path):
+    kinds = (FakeRow("DC", "BL"), FakeRow("NT", "BL"), FakeRow("DC", "ED", 0.1, 1), FakeRow("NT", "ED", 0.1, 1))
+    run = make_fake_run(tmp_path / "run", recordings=2, windows=1, rows=kinds)
+    record = read_run(run)
+    rows = tuple(
+        row.model_copy(update={"name": name, "label": name, "experiment": f"{i} {name}", "sensors": (name,)})
+        for i, (row, name) in enumerate(zip(record.rows, HOSTILE, strict=True))
+    )
+    broken = {name: name for name in HOSTILE}
+    write_run(run, record.model_copy(update={"title": " ".join(HOSTILE), "rows": rows, "failed_logs": broken}))
+    found = _read(write_report(run))
+    assert len(found.all("script")) == 1
+    for name in HOSTILE:
+        assert found.text.count(name) > 3
+
+
+def test_several_runs_are_shown_side_by_side(run, tmp_path):
+    other = make_fake_run(tmp_path / "other", rows=(FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.3, 1)))
+    page = write_report([run, other], tmp_path / "both")
+    text = _read(page).text
+    assert "ED-DC (other) \N{MINUS SIGN} ED-DC (run)" in text
+    assert "BL-DC (run)" in text
+
+
+def test_a_report_needs_no_torch():
+    code = "import sys; import semgrid_eval.report.page; assert 'torch' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,173 @@
+"""The page in headless Chromium, driven by Selenium; skipped where either is missing."""
+
+import csv
+import json
+import shutil
+import time
+
+import pytest
+
+webdriver = pytest.importorskip("selenium.webdriver", reason="Selenium is not installed (pip install selenium)")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+pytestmark = pytest.mark.skipif(
+    not (CHROMIUM and DRIVER), reason="no Chromium with chromedriver is installed (apt install chromium-driver)"
+)
+FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+DOWNLOADS = "downloads"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    home = tmp_path_factory.mktemp("browser")
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in (*FLAGS, f"--user-data-dir={home / 'profile'}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(home / DOWNLOADS)})
+    driver.downloads = home / DOWNLOADS
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture
+def opened(browser, page):
+    _open(browser, page, width=1280)
+    return browser
+
+
+def _open(browser, page, *, width):
+    metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    browser.get("about:blank")
+    browser.get_log("performance")  # forget what the browser itself asked for at its start
+    browser.get_log("browser")
+    browser.get(page.as_uri())
+
+
+def _first_column(browser, table):
+    script = "return [...document.querySelectorAll(arguments[0] + ' tbody th .name')].map(e => e.textContent)"
+    return browser.execute_script(script, table)
+
+
+def test_tables_and_pictures_are_shown_without_error_or_request(opened, page):
+    script = """
+    const done = arguments[0];
+    const pictures = [...document.images];
+    document.querySelectorAll('details').forEach(part => { part.open = true; });
+    pictures.forEach(picture => { picture.loading = 'eager'; });
+    Promise.all(pictures.map(picture => picture.decode().catch(() => null)))
+      .then(() => done(pictures.map(picture => picture.naturalWidth)));
+    """
+    widths = opened.execute_async_script(script)
+    assert len(widths) > 30
+    assert min(widths) > 0
+    assert opened.execute_script("return document.querySelectorAll('table tbody tr').length") > 20
+    log = [json.loads(entry["message"])["message"] for entry in opened.get_log("performance")]
+    requests = [entry["params"]["request"]["url"] for entry in log if entry["method"] == "Network.requestWillBeSent"]
+    assert {url for url in requests if not url.startswith("data:")} == {page.as_uri()}
+    assert opened.get_log("browser") == []
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_nothing_scrolls_sideways(browser, page, width):
+    _open(browser, page, width=width)
+    script = "return [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+    wide, shown = browser.execute_script(script)
+    assert wide <= shown <= width
+
+
+def test_a_click_sorts_and_another_turns_the_order(opened):
+    before = _first_column(opened, "#table-categories")
+    click = "document.querySelectorAll('#table-categories thead button')[4].click()"
+    opened.execute_script(click)
+    falling = _first_column(opened, "#table-categories")
+    opened.execute_script(click)
+    rising = _first_column(opened, "#table-categories")
+    assert falling[0] == "ED-DC"  # best on vehicles
+    assert rising == falling[::-1] != before
+    sort = "return document.querySelectorAll('#table-categories thead th')[4].getAttribute('aria-sort')"
+    assert opened.execute_script(sort) == "ascending"
+
+
+def test_lines_of_one_row_stay_together_when_classes_are_sorted(opened):
+    opened.execute_script("document.querySelectorAll('#table-classes thead button')[7].click()")
+    names = _first_column(opened, "#table-classes")
+    assert names[:3] == ["ED-DC", "paper", "difference"]
+
+
+def test_the_filter_hides_rows(opened):
+    script = """
+    const field = document.querySelector('[data-table=categories] input');
+    field.value = 'sp2';
+    field.dispatchEvent(new Event('input'));
+    return [...document.querySelectorAll('#table-categories tbody')].filter(body => !body.hidden).length;
+    """
+    assert opened.execute_script(script) == 2
+
+
+def test_a_table_can_be_saved_as_csv(opened):
+    opened.execute_script("document.querySelector('[data-table=categories] .tools button').click()")
+    target = opened.downloads / "categories.csv"
+    for _ in range(100):
+        if target.is_file():
+            break
+        time.sleep(0.05)
+    with target.open(newline="") as stream:
+        lines = list(csv.reader(stream))
+    assert lines[0][:3] == ["Row", "Static", "Static, known"]
+    assert len(lines) == 7
+    assert 0 < float(lines[1][1]) < 1
+
+
+def test_the_slider_shows_the_steps_of_a_window(opened):
+    script = """
+    const flip = document.querySelector('.flip'), slider = flip.querySelector('input');
+    const seen = [];
+    for (let step = 0; step <= slider.max; step++) {
+      slider.value = step;
+      slider.dispatchEvent(new Event('input'));
+      seen.push(flip.querySelector('output').value, flip.querySelector('img').src);
+    }
+    return seen;
+    """
+    seen = opened.execute_script(script)
+    assert seen[::2] == ["Input 1 of 2", "Input 2 of 2", "Target", "ED-DC"]
+    assert len(set(seen[1::2])) == 4
+
+
+def test_the_keyboard_reaches_the_skip_link_first(opened):
+    opened.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": "keyDown", "key": "Tab", "windowsVirtualKeyCode": 9})
+    assert opened.execute_script("return document.activeElement.className") == "skip"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_stands_out_in_both_themes(browser, page, scheme):
+    features = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    _open(browser, page, width=1280)
+    script = """
+    const light = text => {
+      const parts = text.match(/[\\d.]+/g).slice(0, 3).map(Number);
+      const linear = parts.map(v => v / 255).map(v => v <= .04045 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4);
+      return .2126 * linear[0] + .7152 * linear[1] + .0722 * linear[2];
+    };
+    const card = light(getComputedStyle(document.querySelector('section')).backgroundColor);
+    return ['.lead', '.hint', 'caption', 'td.gain', 'summary'].map(name => {
+      const ink = light(getComputedStyle(document.querySelector(name)).color);
+      return (Math.max(ink, card) + .05) / (Math.min(ink, card) + .05);
+    });
+    """
+    assert min(browser.execute_script(script)) >= 4.5
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})

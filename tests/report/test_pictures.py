@@ -1,0 +1,46 @@
+import base64
+import io
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from PIL import Image
+
+from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, class_palette
+from semgrid_eval.report.pictures import RIGHT_COLOURS, certainty_png, data_uri, grid_png, right_png
+
+GRIDS = arrays(np.uint8, (5, 7), elements=st.integers(0, CLASS_COUNT - 1))
+
+
+def _colours(png):
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+
+
+@given(GRIDS, arrays(np.bool_, (5, 7)))
+def test_each_cell_has_its_class_colour_and_the_mask_is_white(grid, mask):
+    got = _colours(grid_png(grid, mask))
+    assert (got[mask] == MASK_COLOUR).all()
+    np.testing.assert_array_equal(got[~mask], class_palette()[grid[~mask]])
+
+
+def test_who_is_right_names_each_case():
+    target = np.array([[1, 1, 1, 1, 0, 1]], np.uint8)
+    mine = np.array([[1, 1, 2, 2, 0, 1]], np.uint8)
+    theirs = np.array([[1, 2, 1, 3, 0, 1]], np.uint8)
+    mask = np.array([[False, False, False, False, False, True]])
+    expected = [RIGHT_COLOURS[i] for i in (1, 2, 3, 4, 0, 5)]
+    np.testing.assert_array_equal(_colours(right_png(target, mine, theirs, mask))[0], expected)
+
+
+def test_certainty_is_lighter_where_it_is_higher():
+    light = _colours(certainty_png(np.array([[0, 26, 80, 140, 200, 255]], np.uint8)))[0].sum(axis=1)
+    assert light[0] == light[1]  # nothing is less certain than one in ten
+    assert (np.diff(light[1:].astype(int)) > 0).all()
+
+
+def test_a_picture_is_small_and_carried_as_a_data_uri():
+    png = grid_png(np.zeros((128, 128), np.uint8))
+    uri = data_uri(png)
+    assert len(png) < 500
+    assert base64.b64decode(uri.removeprefix("data:image/png;base64,")) == png
