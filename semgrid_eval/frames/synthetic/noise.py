@@ -1,0 +1,162 @@
+"""The imperfections of stereo disparity and of a segmentation network's labels, drawn frame by frame."""
+
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+FULL_WIDTH_PX = 2048
+_LABEL_WIDTH_PX = 512
+_LABEL_FIELDS_PX = (2.5, 2.5, 6.0, 4.0)  # smoothness of: displacement right, down; bad borders; confusion
+
+
+@dataclass(frozen=True)
+class DisparityNoise:
+    """Errors of disparity; standard deviations are in pixels of a 2048 pixel wide image.
+
+    Args:
+        correlated_px: smooth over `correlation` of the image's width, new in each frame.
+        slow_px: likewise smooth, but carried from frame to frame with `persistence`.
+        white_px: of each pixel for itself.
+        correlation: standard deviation of the smoothing kernel as a share of the width.
+        persistence: share of the slow error that the next frame keeps.
+        dropout: share of the image in patches without disparity.
+        speckle: share of single pixels without disparity.
+        fattened: share of the borders at which the foreground spreads over the background.
+        sky: share of the sky that has a wrong, small disparity.
+    """
+
+    correlated_px: float = 0.25
+    slow_px: float = 0.12
+    white_px: float = 0.40
+    correlation: float = 0.012
+    persistence: float = 0.9
+    dropout: float = 0.05
+    speckle: float = 0.015
+    fattened: float = 0.6
+    sky: float = 0.04
+
+
+@dataclass(frozen=True)
+class LabelNoise:
+    """Errors of labels; lengths are in pixels of a 512 pixel wide image.
+
+    Args:
+        warp_px: standard deviation of the borders' displacement.
+        border_px: how far from the true place a border may be in a bad patch.
+        bad_borders: share of the image in such patches.
+        confused_px: how far the labels of a patch of confusion may be from their true place.
+        confused: share of the image in such patches.
+        persistence: share of each error field that the next frame keeps; the rest flickers.
+    """
+
+    warp_px: float = 0.35
+    border_px: float = 2.0
+    bad_borders: float = 0.10
+    confused_px: float = 8.0
+    confused: float = 0.004
+    persistence: float = 0.7
+
+
+class DisparityErrors:
+    """Gives exact disparities, frame after frame, the errors of stereo matching; invalid is 0."""
+
+    def __init__(self, noise: DisparityNoise, rng: np.random.Generator) -> None:
+        self._noise = noise
+        self._rng = rng
+        self._slow: NDArray[np.float32] | None = None
+
+    def add(self, exact_px: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the next frame's disparity (H, W) with errors, in pixels of its own width."""
+        noise, rng, shape = self._noise, self._rng, exact_px.shape
+        sigma = noise.correlation * shape[1]
+        self._slow = _carried(self._slow, _smooth_field(shape, sigma, rng), noise.persistence)
+        seen = _fattened(exact_px, noise.fattened, rng)
+        error = noise.correlated_px * _smooth_field(shape, sigma, rng) + noise.slow_px * self._slow
+        error += noise.white_px * rng.standard_normal(shape, np.float32)
+        noisy = seen + error * np.float32(shape[1] / FULL_WIDTH_PX)
+        lost = _smooth_field(shape, 0.006 * shape[1], rng) > _threshold(noise.dropout)
+        lost |= rng.random(shape, np.float32) < noise.speckle
+        noisy[lost | _is_occluded(seen) | (seen <= 0.0)] = 0.0
+        _match_sky(noisy, exact_px, noise.sky, rng)
+        return np.maximum(noisy, 0.0)
+
+
+class LabelErrors:
+    """Gives exact labels, frame after frame, the errors of a segmentation network: bent borders, bad patches."""
+
+    def __init__(self, noise: LabelNoise, rng: np.random.Generator) -> None:
+        self._noise = noise
+        self._rng = rng
+        self._fields: list[NDArray[np.float32] | None] = [None] * len(_LABEL_FIELDS_PX)
+
+    def add(self, exact: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the next frame's labels (H, W) with errors."""
+        noise, scale = self._noise, exact.shape[1] / _LABEL_WIDTH_PX
+        fresh = [_smooth_field(exact.shape, sigma_px * scale, self._rng) for sigma_px in _LABEL_FIELDS_PX]
+        fields = [_carried(old, new, noise.persistence) for old, new in zip(self._fields, fresh, strict=True)]
+        self._fields = list(fields)
+        right, down, border, confusion = fields
+        reach = np.full(exact.shape, noise.warp_px * scale, np.float32)
+        reach[border > _threshold(noise.bad_borders)] = noise.border_px * scale
+        reach[confusion > _threshold(noise.confused)] = noise.confused_px * scale
+        rows, columns = np.indices(exact.shape, np.float32)
+        columns += reach * right
+        rows += reach * down
+        return cv2.remap(exact, columns, rows, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+
+
+def _carried(
+    old: NDArray[np.float32] | None, fresh: NDArray[np.float32], persistence: float
+) -> NDArray[np.float32]:
+    """Return the next field of an autoregressive sequence whose variance stays what it is."""
+    if old is None:
+        return fresh
+    return np.float32(persistence) * old + np.float32((1.0 - persistence**2) ** 0.5) * fresh
+
+
+def _smooth_field(shape: tuple[int, ...], sigma: float, rng: np.random.Generator) -> NDArray[np.float32]:
+    """Return a Gaussian field (H, W) of unit variance, smooth over `sigma` pixels.
+
+    It is drawn on a coarser lattice and interpolated, which costs a fraction of blurring at full size.
+    """
+    step = max(1, round(sigma))
+    coarse = rng.standard_normal((shape[0] // step + 4, shape[1] // step + 4), np.float32)
+    coarse = cv2.GaussianBlur(coarse, (0, 0), 1.0)
+    size = (coarse.shape[1] * step, coarse.shape[0] * step)
+    fine = cv2.resize(coarse, size, interpolation=cv2.INTER_CUBIC)[step : step + shape[0], step : step + shape[1]]
+    return np.asarray(fine / max(float(fine.std()), 1e-6), np.float32)
+
+
+def _threshold(share: float) -> float:
+    """Return the value that a Gaussian field exceeds on this share of its area."""
+    return NormalDist().inv_cdf(1.0 - share) if 0.0 < share < 1.0 else float("inf")
+
+
+def _fattened(disparity_px: NDArray[np.float32], share: float, rng: np.random.Generator) -> NDArray[np.float32]:
+    """Let the foreground spread over its border by half a matching window, in patches."""
+    scale = disparity_px.shape[1] / 512
+    kernel = np.ones((2 * round(scale) + 1, 4 * round(scale) + 1), np.uint8)
+    spread = cv2.dilate(disparity_px, kernel)
+    patches = _smooth_field(disparity_px.shape, 0.02 * disparity_px.shape[1], rng) < -_threshold(share)
+    is_border = spread - disparity_px > 0.02 * spread + 0.25
+    return np.where(patches & is_border, spread, disparity_px)
+
+
+def _is_occluded(disparity_px: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Say which points (H, W) of the left image something nearer hides from the right camera."""
+    column_right = np.arange(disparity_px.shape[1], dtype=np.float32) - disparity_px
+    nearest = np.minimum.accumulate(column_right[:, ::-1], axis=1)[:, ::-1]
+    return nearest < column_right - np.float32(0.5)
+
+
+def _match_sky(
+    noisy_px: NDArray[np.float32], exact_px: NDArray[np.float32], share: float, rng: np.random.Generator
+) -> None:
+    """Give patches of the sky a small disparity, as matching does where there is nothing to match."""
+    shape = exact_px.shape
+    patches = (exact_px <= 0.0) & (_smooth_field(shape, 0.01 * shape[1], rng) > _threshold(share))
+    wrong = np.abs(_smooth_field(shape, 0.02 * shape[1], rng)) * np.float32(2.0 * shape[1] / 512)
+    noisy_px[patches] = wrong[patches]

@@ -1,0 +1,145 @@
+"""Plans the recordings of a synthetic data set: which towns, which windows, which split."""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from semgrid_eval.config import Config
+from semgrid_eval.frames.synthetic.drives import choose_drives
+from semgrid_eval.frames.synthetic.kinds import KINDS
+from semgrid_eval.frames.synthetic.rendering import RecordingPlan, render_recording
+from semgrid_eval.frames.synthetic.town import TownSpec, load_town, prepare_town
+from semgrid_eval.progress import Progress
+
+__all__ = ["RecordingPlan", "SyntheticConfig", "plan_recordings", "render_recording"]
+
+
+class SyntheticConfig(Config):
+    """What a synthetic data set is made of.
+
+    Args:
+        recordings: how many, of 30 frames each.
+        seed: the same seed gives the same bytes.
+        width: of the images in pixels.
+        height: of the images in pixels.
+        noise: `modelled` gives labels, disparity and motion their errors, `exact` none.
+        towns: how many; each belongs to one split only.
+        val_share: of the recordings, and of the towns, that are for validation.
+        town_size_m: side of the square that a town's streets cover.
+        duration_s: simulated time of a town from which windows are taken.
+    """
+
+    recordings: Annotated[int, Field(ge=1, le=100_000)]
+    seed: Annotated[int, Field(ge=0, lt=1 << 31)] = 0
+    width: Annotated[int, Field(ge=64, le=4096)] = 512
+    height: Annotated[int, Field(ge=32, le=2048)] = 256
+    noise: Literal["modelled", "exact"] = "modelled"
+    towns: Annotated[int, Field(ge=1, le=100)] = 4
+    val_share: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.3
+    town_size_m: Annotated[float, Field(ge=250.0, le=2000.0)] = 600.0
+    duration_s: Annotated[float, Field(ge=10.0, le=3600.0)] = 120.0
+
+    @model_validator(mode="after")
+    def _splits_need_towns(self) -> Self:
+        if self.val_share > 0.0 and self.towns < 2:
+            raise ValueError("training and validation need different towns: ask for 2 towns or more, or val_share 0")
+        return self
+
+
+def plan_recordings(
+    config: SyntheticConfig, cache_dir: Path, progress: Progress, *, workers: int = 1
+) -> list[RecordingPlan]:
+    """Simulate the towns that the cache does not hold yet, and choose the windows of all recordings.
+
+    Args:
+        config: of the data set.
+        cache_dir: where towns are kept.
+        progress: told of each finished town.
+        workers: towns simulated at the same time; the plans do not depend on it.
+
+    Raises:
+        InputError: SUMO failed, the cache cannot be written to, or a town's traffic holds too few windows.
+        MissingExtraError: SUMO is not installed.
+    """
+    shares = [share for share in _shares(config) if share.recordings > 0]
+    folders = _prepare_towns([share.town for share in shares], cache_dir, progress, workers)
+    plans: list[RecordingPlan] = []
+    for share, folder in zip(shares, folders, strict=True):
+        plans += _plans_of_town(config, share, folder, len(plans))
+    return plans
+
+
+@dataclass(frozen=True)
+class _Share:
+    """One town's part of a data set."""
+
+    town: TownSpec
+    split: str
+    recordings: int
+
+
+def _shares(config: SyntheticConfig) -> list[_Share]:
+    """Give each split towns of its own, of the same kinds in the same order, and each town its recordings."""
+    val_towns = max(1, round(config.towns * config.val_share)) if config.val_share > 0.0 else 0
+    val_recordings = round(config.recordings * config.val_share)
+    shares: list[_Share] = []
+    for split, towns, recordings in (
+        ("train", config.towns - val_towns, config.recordings - val_recordings),
+        ("val", val_towns, val_recordings),
+    ):
+        for position in range(towns):
+            kind = KINDS[position % len(KINDS)].name
+            spec = TownSpec(len(shares), kind, config.seed, config.town_size_m, config.duration_s)
+            shares.append(_Share(spec, split, (recordings + towns - 1 - position) // towns))
+    return shares
+
+
+def _prepare_towns(specs: list[TownSpec], cache_dir: Path, progress: Progress, workers: int) -> list[Path]:
+    folders: list[Path | None] = [None] * len(specs)
+    with _executor(min(workers, len(specs))) as executor:
+        waiting = {executor.submit(prepare_town, spec, cache_dir): index for index, spec in enumerate(specs)}
+        for done, future in enumerate(as_completed(waiting), start=1):
+            index = waiting[future]
+            folders[index] = future.result()
+            progress(done, len(specs), f"town {specs[index].index} ({specs[index].kind})")
+    return [folder for folder in folders if folder is not None]
+
+
+@contextmanager
+def _executor(workers: int) -> Iterator[Executor]:
+    """Give processes, or for a single worker a thread: SUMO is a process of its own anyway."""
+    context = get_context("spawn")
+    executor: Executor = (
+        ProcessPoolExecutor(workers, mp_context=context) if workers > 1 else ThreadPoolExecutor(max_workers=1)
+    )
+    try:
+        yield executor
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def _plans_of_town(config: SyntheticConfig, share: _Share, folder: Path, first: int) -> list[RecordingPlan]:
+    spec = share.town
+    traffic = load_town(folder).traffic
+    drives = choose_drives(traffic, share.recordings, np.random.default_rng([spec.seed, spec.index, 1]))
+    return [
+        RecordingPlan(
+            name=f"town{spec.index:02d}_{first + position:06d}_000000",
+            split=share.split,
+            town=folder,
+            town_digest=spec.digest(),
+            drive=chosen,
+            seed=(spec.seed, spec.index, 2, position),
+            width_px=config.width,
+            height_px=config.height,
+            noise=config.noise,
+        )
+        for position, chosen in enumerate(drives)
+    ]

@@ -1,0 +1,168 @@
+"""A simulated camera: pinhole rays cast with Embree at the town's triangles and an analytic ground plane."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.errors import MissingExtraError
+from semgrid_eval.frames.synthetic.ground import SURFACE_LABELS, Ground
+from semgrid_eval.frames.synthetic.solids import Soup
+from semgrid_eval.frames.types import CameraCalibration, Pose
+
+FULL_WIDTH_PX, FULL_HEIGHT_PX = 2048, 1024
+MAX_DEPTH_M = 400.0
+NO_TRIANGLE = -1
+_SKY = LABEL_ID["sky"]
+
+
+def cityscapes_camera(width_px: int, height_px: int) -> CameraCalibration:
+    """Return a camera like the one of Cityscapes, scaled to an image size with half-pixel centres."""
+    scale_u, scale_v = width_px / FULL_WIDTH_PX, height_px / FULL_HEIGHT_PX
+    return CameraCalibration(
+        fx_px=2262.0 * scale_u,
+        fy_px=2265.0 * scale_v,
+        u0_px=(1096.0 + 0.5) * scale_u - 0.5,
+        v0_px=(513.0 + 0.5) * scale_v - 0.5,
+        baseline_m=0.209,
+        x_m=1.7,
+        y_m=0.1,
+        z_m=1.22,
+        roll_rad=0.0,
+        pitch_rad=0.038,
+        yaw_rad=-0.002,
+    )
+
+
+def ego_from_camera_rotation(calibration: CameraCalibration) -> NDArray[np.float64]:
+    """Return the rotation (3, 3) from the optical frame (right, down, forward) to the vehicle frame."""
+    yaw, pitch, roll = calibration.yaw_rad, calibration.pitch_rad, calibration.roll_rad
+    about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
+    about_y = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
+    about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
+    vehicle_from_optical_axes = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    return np.asarray(about_z @ about_y @ about_x @ vehicle_from_optical_axes)
+
+
+@dataclass(frozen=True)
+class View:
+    """What a camera sees; all arrays are (H, W).
+
+    Args:
+        depth_m: along the optical axis, infinite for the sky.
+        label: Cityscapes label id.
+        instance: actor id, 0 where there is none.
+        surface: of the ground, where there is ground.
+        triangle: index of the triangle that is seen, `NO_TRIANGLE` where it is ground or sky.
+    """
+
+    depth_m: NDArray[np.float32]
+    label: NDArray[np.uint8]
+    instance: NDArray[np.uint16]
+    surface: NDArray[np.uint8]
+    triangle: NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera on a vehicle."""
+
+    calibration: CameraCalibration
+    width_px: int
+    height_px: int
+
+    @cached_property
+    def rays_ego(self) -> NDArray[np.float32]:
+        """Rays (H * W, 3) in the vehicle frame; their part along the optical axis is 1, so a ray's length is depth."""
+        c = self.calibration
+        right = (np.arange(self.width_px) - c.u0_px) / c.fx_px
+        down = (np.arange(self.height_px) - c.v0_px) / c.fy_px
+        rays = np.stack(np.broadcast_arrays(right[None], down[:, None], 1.0), axis=-1).reshape(-1, 3)
+        return (rays @ ego_from_camera_rotation(c).T).astype(np.float32)
+
+    @cached_property
+    def origin_ego_m(self) -> NDArray[np.float32]:
+        """The optical centre (3,) in the vehicle frame."""
+        return np.array([self.calibration.x_m, self.calibration.y_m, self.calibration.z_m], np.float32)
+
+    @cached_property
+    def ground_depth_m(self) -> NDArray[np.float32]:
+        """Depth (H * W,) at which each ray meets the ground plane, infinite where it does not."""
+        fall = -self.rays_ego[:, 2]
+        with np.errstate(divide="ignore"):
+            return np.where(fall > 0.0, self.origin_ego_m[2] / fall, np.inf).astype(np.float32)
+
+    def points_ego(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the points (H * W, 3) in the vehicle frame at depths (H, W) or (H * W,)."""
+        return self.origin_ego_m + depth_m.reshape(-1, 1) * self.rays_ego
+
+    def disparity_px(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the disparity of depths; that of the sky is 0."""
+        return (self.calibration.fx_px * self.calibration.baseline_m / depth_m).astype(np.float32)
+
+
+class RayCaster:
+    """Triangles that rays can be cast at."""
+
+    def __init__(self, triangles_m: NDArray[np.float32]) -> None:
+        """Build Embree's tree over triangles (F, 3, 3), at least one.
+
+        Raises:
+            MissingExtraError: Embree is not installed.
+        """
+        try:
+            from embreex.mesh_construction import TriangleMesh
+            from embreex.rtcore_scene import EmbreeScene
+        except ImportError:
+            raise MissingExtraError("synthetic", "embreex") from None
+        self._scene = EmbreeScene()
+        self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(triangles_m))
+
+    def cast(
+        self, origins_m: NDArray[np.float32], rays: NDArray[np.float32], limit: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Return how far (N,) each ray gets, in its own lengths, and the triangle (N,) that stops it.
+
+        Args:
+            origins_m: (N, 3) or (3,).
+            rays: (N, 3).
+            limit: (N,) beyond which nothing is seen.
+        """
+        origins = np.ascontiguousarray(np.broadcast_to(origins_m, rays.shape))
+        found = self._scene.run(origins, rays, dists=limit, query="INTERSECT", output=True)
+        return found["tfar"], found["primID"]
+
+
+def look(camera: Camera, caster: RayCaster, soup: Soup, ground: Ground, pose: Pose) -> View:
+    """Cast one ray a pixel.
+
+    Args:
+        camera: on the vehicle.
+        caster: holds the soup's triangles in the vehicle frame.
+        soup: labels and instances of the triangles.
+        ground: in the map frame.
+        pose: of the vehicle.
+    """
+    limit_m = np.minimum(camera.ground_depth_m, MAX_DEPTH_M)
+    depth_m, triangle = caster.cast(camera.origin_ego_m, camera.rays_ego, limit_m)
+    surface = _ground_seen(camera, ground, pose)
+    is_ground = (triangle == NO_TRIANGLE) & (camera.ground_depth_m < np.inf)
+    is_sky = (triangle == NO_TRIANGLE) & ~is_ground
+    depth = np.where(is_ground, camera.ground_depth_m, np.where(is_sky, np.float32(np.inf), depth_m))
+    label = np.where(is_sky, np.uint8(_SKY), np.where(is_ground, SURFACE_LABELS[surface], soup.label[triangle]))
+    instance = np.where(triangle == NO_TRIANGLE, np.uint16(0), soup.instance[triangle])
+    shape = (camera.height_px, camera.width_px)
+    return View(*(part.reshape(shape) for part in (depth, label, instance, surface, triangle)))
+
+
+def _ground_seen(camera: Camera, ground: Ground, pose: Pose) -> NDArray[np.uint8]:
+    """Return the surface (H * W,) where each ray meets the ground plane, whether something hides it or not."""
+    depth_m = np.minimum(camera.ground_depth_m, MAX_DEPTH_M)
+    points = camera.points_ego(depth_m)
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    x_m = pose.x_m + cos * points[:, 0] - sin * points[:, 1]
+    y_m = pose.y_m + sin * points[:, 0] + cos * points[:, 1]
+    return ground.at(x_m, y_m)
