@@ -71,8 +71,11 @@ class EncoderDecoder(nn.Module):
 
     def forward(self, past: Tensor) -> Tensor:
         """Score the target: (B, S, T, H, W) uint8 class ids -> (B, C, H, W) logits."""
-        features = one_hot_planes(past.flatten(1, 2), _working_dtype(self.narrow.weight))
-        skips: list[Tensor] = []
+        return self.from_planes(one_hot_planes(past.flatten(1, 2), _working_dtype(self.narrow.weight)))
+
+    def from_planes(self, planes: Tensor) -> Tensor:
+        """Score the target from class probabilities: (B, S * T * C, H, W) -> (B, C, H, W) logits."""
+        features, skips = planes, list[Tensor]()
         for block in self.encoder:
             features = block(F.max_pool2d(features, 2) if skips else features)
             skips.append(features)
