@@ -1,0 +1,68 @@
+"""BL-Table: probabilities of a cell's class given the classes that the inputs show there, counted in training."""
+
+import torch
+from torch import Tensor
+
+from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.progress import Progress, silent
+from semgrid_eval.sequences.dataset import WindowBatch, WindowSet
+
+GRID_LIMIT = 5
+"""Grids that a table looks at, the newest ones: it has 10 to the power of their number rows."""
+SMOOTHING_CELLS = 50.0
+"""How many cells of what fewer grids suggest are added to the counts of each row."""
+
+
+class ClassTable:
+    """A table over the newest K grids as a predictor.
+
+    Args:
+        probability: (C ** K, C) of each target class; a row's index has the newest grid's class as its first digit.
+    """
+
+    def __init__(self, probability: Tensor, grids: int) -> None:
+        self._probability = probability
+        self._grids = grids
+
+    def __call__(self, batch: WindowBatch, /) -> Tensor:
+        """Look every cell up: (B, C, H, W)."""
+        table = self._probability.to(batch.past.device)
+        return table[_rows(batch, self._grids)].permute(0, 3, 1, 2)
+
+
+def count_table(windows: WindowSet, *, batch: int = 64, progress: Progress = silent) -> ClassTable:
+    """Count the target's classes over all cells outside M of training windows."""
+    grids = min(windows.grids_per_window, GRID_LIMIT)
+    size = CLASS_COUNT ** (grids + 1)
+    counts = torch.zeros(size, dtype=torch.int64)
+    done = 0
+    for part in windows.batches(batch):
+        index = _rows(part, grids) * CLASS_COUNT + part.target
+        counts += torch.bincount(index[~part.mask], minlength=size).cpu()
+        done += len(part.target)
+        progress(done, len(windows))
+    return ClassTable(_smoothed(counts.view([CLASS_COUNT] * (grids + 1)).double()).float(), grids)
+
+
+def _rows(batch: WindowBatch, grids: int) -> Tensor:
+    """Number the classes of the newest grids, newest first and sensors in order: (B, H, W) int64."""
+    newest_first = batch.past.flip(2).transpose(1, 2).flatten(1, 2)[:, :grids]  # (B, K, H, W)
+    rows = torch.zeros_like(batch.target, dtype=torch.int64)
+    for grid in newest_first.unbind(dim=1):
+        rows = rows * CLASS_COUNT + grid
+    return rows
+
+
+def _smoothed(counts: Tensor) -> Tensor:
+    """Turn counts (C, ..., C), inputs then target, into probabilities (rows, C).
+
+    A row that was seen seldom leans on the same row without its oldest grid, and so on down to the bare frequencies.
+    """
+    marginals = [counts]
+    while marginals[-1].ndim > 1:
+        marginals.append(marginals[-1].sum(dim=-2))
+    prior = torch.tensor(1 / CLASS_COUNT, dtype=counts.dtype)
+    for seen in reversed(marginals):
+        cells = seen.sum(dim=-1, keepdim=True) + SMOOTHING_CELLS
+        prior = ((seen + SMOOTHING_CELLS * prior) / cells).unsqueeze(-2)
+    return prior.reshape(-1, CLASS_COUNT)
