@@ -24,15 +24,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Contest:
-    """A model, the baselines that it is measured against, and which seed of it is shown."""
+    """A model, the baselines that it is measured against."""
 
     model: Row
     rivals: tuple[Row, ...]
 
     @property
     def result(self) -> Result:
-        """The result whose predictions are shown: that of the first seed."""
-        return self.model.results[0]
+        """The result whose predictions are shown."""
+        return self.model.shown
 
     @property
     def rule(self) -> str:
@@ -98,7 +98,7 @@ def rule_values(contest: Contest) -> Array:
     counts = contest.result.counts
     mine = class_iou(counts.astype(np.int64))
     few = counts.sum(axis=2) < MIN_CELLS
-    gaps = [mine - _aligned_iou(contest.result, rival.results[0]) for rival in contest.rivals] or [mine]
+    gaps = [mine - _aligned_iou(contest.result, rival.shown) for rival in contest.rivals] or [mine]
     value = gaps[0]
     for gap in gaps[1:]:
         value = np.minimum(value, gap)

@@ -12,11 +12,12 @@ from semgrid_eval.files import write_json, write_text
 from semgrid_eval.report.cells import ABSENT
 from semgrid_eval.report.comparison import reference_of
 from semgrid_eval.report.estimates import CATEGORY_COLUMNS, COLUMNS, DRAWS, LEVEL, Estimate, RowScores
+from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.longform import category_table, class_table
-from semgrid_eval.report.plots import Plot
 from semgrid_eval.report.provenance import failures
 from semgrid_eval.report.reading import Run
 from semgrid_eval.report.tables import LABELS
+from semgrid_eval.report.where import BANDS, ORIGINS, Where
 
 RECORD = "report.json"
 FORMAT_VERSION = 1
@@ -41,6 +42,24 @@ def write_tables(folder: Path, runs: Sequence[Run], scores: Scores) -> None:
     write_text(folder / "summary.md", markdown_table(scores))
     write_text(folder / "summary.tex", latex_table(scores))
     write_json(folder / RECORD, report_record(runs, scores))
+
+
+def write_located(folder: Path, located: Sequence[Where]) -> None:
+    """Write where.csv (row, split, part, value) and calibration.csv (row, certainty, right, cells)."""
+    lines = [
+        (entry.row.name, split, part, value)
+        for entry in located
+        for split, parts, values in (
+            ("distance", BANDS, entry.band_scores()),
+            ("seen", ORIGINS, entry.origin_shares()),
+        )
+        for part, value in zip(parts, values, strict=True)
+    ]
+    _write_csv(folder / "where.csv", pd.DataFrame(lines, columns=["row", "split", "part", "value"]))
+    tables = [entry.calibration().assign(row=entry.row.name) for entry in located]
+    empty = pd.DataFrame(columns=["row", "certainty", "right", "cells"])
+    whole = pd.concat(tables)[list(empty.columns)] if tables else empty
+    _write_csv(folder / "calibration.csv", whole)
 
 
 def write_figures(folder: Path, figures: Mapping[str, Sequence[Plot]]) -> None:

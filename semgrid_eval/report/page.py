@@ -10,17 +10,21 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from semgrid_eval import __version__
+from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_folder
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.report import exports, plots, provenance, tables
+from semgrid_eval.report import diagrams, exports, plots, provenance, tables
+from semgrid_eval.report.cells import Table
 from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, Headline, headline
 from semgrid_eval.report.estimates import RowScores, score_rows
 from semgrid_eval.report.examples import Contest, choose, choose_by_class, contests
+from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.panels import Example, example_windows
 from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.reading import Row, Run, load_runs
 from semgrid_eval.report.summary import summarise
+from semgrid_eval.report.where import Where, locate_rows
 
 PAGE = "index.html"
 _SEED = 20190623
@@ -48,25 +52,35 @@ def write_report(run: Path | Sequence[Path], out: Path | None = None, *, progres
     runs = load_runs(folders, progress=progress)
     rows = [row for each in runs for row in each.rows]
     scores = score_rows(rows, np.random.default_rng(_SEED))
-    figures = draw_figures(scores, rows)
+    located, problems = locate_rows(entry.row for entry in scores.values())
+    figures = draw_figures(scores, rows, located)
     with atomic_folder(out) as folder:
         exports.write_tables(folder, runs, scores)
+        exports.write_located(folder, located)
         exports.write_figures(folder, figures)
-        (folder / PAGE).write_text(render_page(runs, scores, figures), encoding="utf-8")
+        (folder / PAGE).write_text(render_page(runs, scores, figures, located, problems), encoding="utf-8")
     return out / PAGE
 
 
-def draw_figures(scores: Scores, rows: Sequence[Row]) -> dict[str, list[plots.Plot]]:
+def draw_figures(scores: Scores, rows: Sequence[Row], located: Sequence[Where]) -> dict[str, list[Plot]]:
     """Draw all figures by section of the page."""
     return {
         "overview": plots.category_overview(scores),
         "categories": plots.category_plots(scores),
         "horizon": plots.horizon_plots(scores),
         "training": plots.training_plots(rows),
+        "calibration": diagrams.calibration_plots(located),
+        "architecture": diagrams.architecture_plots(scores),
     }
 
 
-def render_page(runs: Sequence[Run], scores: Scores, figures: Mapping[str, Sequence[plots.Plot]]) -> str:
+def render_page(
+    runs: Sequence[Run],
+    scores: Scores,
+    figures: Mapping[str, Sequence[Plot]],
+    located: Sequence[Where],
+    problems: Sequence[str],
+) -> str:
     """Render the page as HTML that needs nothing but itself."""
     found = headline(scores)
     environment = Environment(
@@ -84,7 +98,9 @@ def render_page(runs: Sequence[Run], scores: Scores, figures: Mapping[str, Seque
         runs=runs,
         title=", ".join(each.record.title for each in runs),
         summary=summarise(runs, scores, found),
-        tables=page_tables(runs, scores),
+        tables=page_tables(runs, scores) | tables.where_tables(located),
+        confusions=confusion_tables(scores, found),
+        problems=problems,
         figures=figures,
         legend=(*CLASS_LEGEND, MASK_LEGEND),
         right_legend=RIGHT_LEGEND,
@@ -99,15 +115,22 @@ def render_page(runs: Sequence[Run], scores: Scores, figures: Mapping[str, Seque
 def page_tables(runs: Sequence[Run], scores: Scores) -> dict[str, Any]:
     """Make the page's tables of scores; a table with nothing to show is None."""
     if not scores:
-        return dict.fromkeys(("categories", "differences", "classes", "merged", "runs", "costs"))
+        return dict.fromkeys(("categories", "differences", "class_differences", "classes", "merged", "runs", "costs"))
     return {
         "categories": tables.category_values(scores),
         "differences": tables.difference_table("differences", scores, DIFFERENCE_COLUMNS),
+        "class_differences": tables.difference_table("class-differences", scores, CLASS_NAMES),
         "classes": tables.class_values(scores),
         "merged": tables.merged_values(scores),
         "runs": tables.run_differences(scores, [each.tag for each in runs], DIFFERENCE_COLUMNS),
         "costs": tables.training_table(list(scores.values())),
     }
+
+
+def confusion_tables(scores: Scores, found: Headline | None) -> list[Table]:
+    """Make the confusion tables of the best row and of the baseline it is measured against."""
+    rows = [] if found is None else [row for row in (found.best, found.reference or found.rival) if row is not None]
+    return [tables.confusion_table(scores[row.name], f"confusion-{i}") for i, row in enumerate(rows)]
 
 
 def example_groups(rows: Sequence[Row], found: Headline | None) -> list[dict[str, Any]]:

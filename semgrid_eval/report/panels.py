@@ -64,7 +64,7 @@ def _draw(contest: Contest, picks: Sequence[Pick]) -> Iterator[Example]:
     path = windows_file(contest.model.run, result.record.windows_id)
     shown = _read(path, ("inputs", "target", "mask"), at)
     mine = _read(result.folder / "predictions.npz", ("prediction", "certainty"), at)
-    rivals = {rival.name: _rival_predictions(result, rival.results[0], at) for rival in contest.rivals}
+    rivals = {rival.name: _rival_predictions(result, rival.shown, at) for rival in contest.rivals}
     for i, pick in enumerate(picks):
         window = result.record.windows[pick.index]
         grids = {name: array[i] for name, array in (shown | mine).items()}

@@ -1,8 +1,6 @@
-"""The figures: category bars as the paper's Fig. 5, training curves and scores over the horizon, as PNG and SVG."""
+"""The figures of scores: category bars as the paper's Fig. 5, training curves and scores over the horizon."""
 
-import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
@@ -13,62 +11,11 @@ from matplotlib.ticker import StrMethodFormatter
 
 from semgrid_eval.classes import CATEGORY_NAMES
 from semgrid_eval.report.estimates import CATEGORY_COLUMNS, RowScores
+from semgrid_eval.report.figure import INK, PALETTE, SETTINGS, STROKES, Plot, finish, short
 from semgrid_eval.report.reading import Row
 from semgrid_eval.report.tables import LABELS
 
-# Okabe and Ito's colours, which colour-blind readers can tell apart; the first two are those of BL and ED.
-PALETTE = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
-INK, RULE = "#2a2f36", "#d5d9de"
-_DARK = {INK: "#dfe3e8", RULE: "#3a4048"}
-_SETTINGS: Any = {
-    "font.family": "sans-serif",
-    "font.size": 9,
-    "text.parse_math": False,  # names are text, whatever dollar signs they hold
-    "svg.fonttype": "none",
-    "svg.hashsalt": "semgrid-eval",
-    "axes.edgecolor": RULE,
-    "axes.labelcolor": INK,
-    "axes.titlecolor": INK,
-    "axes.titlesize": 10,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "axes.grid.axis": "y",
-    "grid.color": RULE,
-    "grid.linewidth": 0.6,
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "legend.frameon": False,
-}
-_NAME_CHARACTERS = 18
-
 Scores = Mapping[str, RowScores]
-
-
-@dataclass(frozen=True)
-class Plot:
-    """A figure in both forms, the table it was drawn from and what it shows in words."""
-
-    name: str
-    png: bytes
-    svg: str
-    source: str
-    caption: str
-
-    @property
-    def themed_svg(self) -> str:
-        """The SVG with colours that follow the reader's light or dark setting, and without a background."""
-        light = "".join(f"--c{i}:{colour};" for i, colour in enumerate(_DARK))
-        dark = "".join(f"--c{i}:{colour};" for i, colour in enumerate(_DARK.values()))
-        media = f"@media (prefers-color-scheme:dark){{:root{{{dark}}}}}"
-        style = f"<style>:root{{{light}}}{media}#patch_1{{display:none}}</style>"
-        text = self.svg
-        for i, colour in enumerate(_DARK):
-            text = text.replace(colour, f"var(--c{i})")
-        head, tail = text.split("<defs>", 1)
-        return f"{head}{style}<defs>{tail}"
 
 
 def category_plots(scores: Scores) -> list[Plot]:
@@ -86,18 +33,18 @@ def training_plots(rows: Sequence[Row]) -> list[Plot]:
     trained = [row for row in rows if any(_curve(result.history, "loss") for result in row.results)]
     if not trained:
         return []
-    with mpl.rc_context(_SETTINGS):
+    with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=(7.2, 3.2), layout="constrained")
         axes = figure.add_subplot()
         for index, row in enumerate(trained):
-            _training_curves(axes, row, PALETTE[(index + 1) % len(PALETTE)])
+            _training_curves(axes, row, index + 1)
         axes.set(xlabel="epoch", ylabel="loss", yscale="log")
         for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
             ticks(StrMethodFormatter("{x:g}"))
         axes.tick_params(axis="y", which="minor", labelsize=7)
-        axes.legend(fontsize=8, ncols=2)
+        axes.legend(fontsize=8, ncols=1 + len(trained) // 4)
         caption = "Training loss (thin, one line a seed) and validation loss (thick, mean over seeds) by epoch."
-        return [_finish(figure, "training", "history.csv of each result", caption)]
+        return [finish(figure, "training", "history.csv of each result", caption)]
 
 
 def horizon_plots(scores: Scores) -> list[Plot]:
@@ -105,16 +52,16 @@ def horizon_plots(scores: Scores) -> list[Plot]:
     lines = _horizon_lines(scores)
     if not lines:
         return []
-    with mpl.rc_context(_SETTINGS):
+    with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=(7.2, 2.8), layout="constrained")
         for axes, category in zip(figure.subplots(1, len(CATEGORY_NAMES), sharex=True), CATEGORY_NAMES, strict=True):
             for index, (model, entries) in enumerate(lines.items()):
                 steps = [entry.row.record.horizon_steps for entry in entries]
                 values = [entry.mean[category] for entry in entries]
-                axes.plot(steps, values, "o-", color=PALETTE[index % len(PALETTE)], label=_short(model), markersize=4)
+                axes.plot(steps, values, "o-", color=PALETTE[index % len(PALETTE)], label=short(model), markersize=4)
             axes.set(title=LABELS[category], xticks=sorted({*steps}), xlabel="horizon (steps)")
         figure.axes[0].legend(fontsize=8)
-        return [_finish(figure, "horizon", "categories.csv", "Category IoU over the horizon, in steps of the inputs.")]
+        return [finish(figure, "horizon", "categories.csv", "Category IoU over the horizon, in steps of the inputs.")]
 
 
 def _category_plot(scores: Scores, categories: Sequence[str], name: str) -> Plot:
@@ -123,7 +70,7 @@ def _category_plot(scores: Scores, categories: Sequence[str], name: str) -> Plot
     width_in = min(14.0, max(4.6, 1.2 + 0.36 * len(experiments) * len(models)))
     columns = min(2, len(categories))
     lines = -(-len(categories) // columns)
-    with mpl.rc_context(_SETTINGS):
+    with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=(width_in * columns, 2.7 * lines), layout="constrained")
         panels = np.atleast_1d(figure.subplots(lines, columns, sharey=False)).ravel()
         for axes, category in zip(panels, categories, strict=True):
@@ -131,7 +78,7 @@ def _category_plot(scores: Scores, categories: Sequence[str], name: str) -> Plot
         panels[0].legend(fontsize=8, ncols=len(models), loc="lower left", bbox_to_anchor=(0, 1.08), borderaxespad=0)
         words = ", ".join(LABELS[category].lower() for category in categories)
         caption = f"IoU of {words} by experiment; lines on the bars are 95 % intervals."
-        return _finish(figure, name, "categories.csv", caption)
+        return finish(figure, name, "categories.csv", caption)
 
 
 def _bars(axes: Axes, scores: Scores, category: str, experiments: list[str], models: list[str]) -> None:
@@ -141,14 +88,14 @@ def _bars(axes: Axes, scores: Scores, category: str, experiments: list[str], mod
         x = [experiments.index(_experiment(e)) + (at - (len(models) - 1) / 2) * wide for e in entries]
         estimates = [entry.estimate(category) for entry in entries]
         values = np.array([estimate.value for estimate in estimates])
-        axes.bar(x, np.nan_to_num(values), 0.92 * wide, color=PALETTE[at % len(PALETTE)], label=_short(model))
+        axes.bar(x, np.nan_to_num(values), 0.92 * wide, color=PALETTE[at % len(PALETTE)], label=short(model))
         for place, estimate in zip(x, estimates, strict=True):
             if np.isfinite(estimate.low):
                 axes.plot([place, place], [estimate.low, estimate.high], color=INK, linewidth=1)
             label = f"{estimate.value:.2f}" if np.isfinite(estimate.value) else "absent"
             top = np.nanmax([estimate.value, estimate.high, 0.0])
             axes.annotate(label, (place, top), (0, 2), textcoords="offset points", ha="center", fontsize=7)
-    axes.set_xticks(range(len(experiments)), [_short(name) for name in experiments])
+    axes.set_xticks(range(len(experiments)), [short(name) for name in experiments])
     axes.set_title(LABELS[category], loc="right")
     axes.set_ylabel("IoU")
     axes.grid(visible=False, axis="x")
@@ -180,35 +127,22 @@ def _horizon_lines(scores: Scores) -> dict[str, list[RowScores]]:
     return {m: e for m, e in ordered.items() if len({entry.row.record.horizon_steps for entry in e}) > 1}
 
 
-def _training_curves(axes: Axes, row: Row, colour: str) -> None:
+def _training_curves(axes: Axes, row: Row, index: int) -> None:
+    colour, stroke = PALETTE[index % len(PALETTE)], STROKES[index // len(PALETTE) % len(STROKES)]
     curves = [_curve(result.history, "loss") for result in row.results]
     for curve in curves:
-        axes.plot(range(1, len(curve) + 1), curve, color=colour, linewidth=0.7, alpha=0.6)
+        axes.plot(range(1, len(curve) + 1), curve, color=colour, linestyle=stroke, linewidth=0.7, alpha=0.6)
     checks = [_curve(result.history, "validation_loss") for result in row.results]
     shortest = min((len(check) for check in checks if check), default=0)
     mean = np.array([check[:shortest] for check in checks if check], np.float64).reshape(-1, shortest).mean(axis=0)
-    label = _short(row.name)
+    label = short(row.name)
     if np.isfinite(mean).any():
-        axes.plot(range(1, shortest + 1), mean, color=colour, linewidth=2, marker="o", markersize=3, label=label)
+        axes.plot(range(1, shortest + 1), mean, color=colour, linestyle=stroke, linewidth=2, label=label)
     else:
-        axes.plot([], [], color=colour, label=label)
+        axes.plot([], [], color=colour, linestyle=stroke, label=label)
 
 
 def _curve(history: Any, column: str) -> list[float]:  # noqa: ANN401 - a data frame or None
     if history is None or column not in history:
         return []
     return [float(value) for value in history[column]]
-
-
-def _short(name: str) -> str:
-    """Cut a name to what fits under a bar; control characters, which XML forbids, become spaces."""
-    name = "".join(character if character.isprintable() else " " for character in name)
-    return name if len(name) <= _NAME_CHARACTERS else f"{name[: _NAME_CHARACTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
-
-
-def _finish(figure: Figure, name: str, source: str, caption: str) -> Plot:
-    picture, drawing = io.BytesIO(), io.BytesIO()
-    figure.savefig(picture, format="png", dpi=160, metadata={"Software": None})
-    figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})
-    text = drawing.getvalue().decode()
-    return Plot(name, picture.getvalue(), text[text.index("<svg") :], source, caption)

@@ -32,15 +32,10 @@ class Result:
     history: pd.DataFrame | None
     folder: Path
 
-    @property
-    def seed(self) -> int:
-        """The seed; 0 where the predictor does not depend on chance."""
-        return self.record.seed or 0
-
 
 @dataclass(frozen=True)
 class Row:
-    """One row of the matrix with its readable results, in the order of seeds, and what went wrong."""
+    """One row of the matrix with its readable results, in the order of its record, and what went wrong."""
 
     name: str  # unique in the report: the record's name, with its run's tag where there are several runs
     record: RowRecord
@@ -52,6 +47,12 @@ class Row:
     def is_baseline(self) -> bool:
         """Whether the row is one of the model-driven baselines, which need no training."""
         return self.record.model == "BL" or self.record.model.startswith("BL-")
+
+    @property
+    def shown(self) -> Result:
+        """The result to show pictures of: the first one that kept its predictions."""
+        kept = (result for result in self.results if (result.folder / "predictions.npz").is_file())
+        return next(kept, self.results[0])
 
     @property
     def windows(self) -> int:
@@ -107,7 +108,7 @@ def _load_row(run: Path, row: RowRecord, name: str) -> Row:
         failures.append("it has no result")
     if found and not any(len(result.counts) for result in found):
         failures.append("it has no window to score")
-    return Row(name, row, tuple(sorted(found, key=lambda result: result.seed)), tuple(failures), run)
+    return Row(name, row, tuple(found), tuple(failures), run)
 
 
 def _load_result(folder: Path) -> Result:

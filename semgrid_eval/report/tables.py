@@ -3,9 +3,11 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.cells import (
+    ABSENT,
     Cell,
     Line,
     Table,
@@ -20,9 +22,11 @@ from semgrid_eval.report.comparison import reference_of, verdict
 from semgrid_eval.report.estimates import CATEGORY_COLUMNS, MERGED_COLUMNS, Estimate, RowScores
 from semgrid_eval.report.longform import target_cells
 from semgrid_eval.report.paper import paper_table
+from semgrid_eval.report.where import BANDS, ORIGINS, Where
 
 Scores = Mapping[str, RowScores]
 
+_PAPER = "The paper's values (Table A1) come from Cityscapes' validation set."
 LABELS = {
     "static": "Static",
     "static_known": "Static, known",
@@ -39,20 +43,15 @@ LABELS = {
 
 
 def value_table(name: str, caption: str, scores: Scores, columns: Sequence[str]) -> Table:
-    """Show the columns of every row, the best of each column marked."""
+    """Show the columns of every row, the best of each marked, beside the paper's values where it has them."""
     best = {column: _best(scores, column) for column in columns}
-    bodies = []
-    for row, entry in scores.items():
-        cells = [
-            value_cell(entry.estimate(c), title=_evidence(entry, c), best=entry.mean[c] == best[c]) for c in columns
-        ]
-        bodies.append((Line(row, tuple(cells), title=entry.row.record.label),))
-    return Table(name, caption, "Row", _headers(scores, columns), tuple(bodies))
+    bodies = tuple(_value_body(entry, best) for entry in scores.values())
+    return Table(name, caption, "Row", _headers(scores, columns), bodies)
 
 
 def category_values(scores: Scores) -> Table:
     """Show the categories as the paper counts them."""
-    caption = "Category scores: mean of the class IoUs, with 95 % interval. Best of each column in bold."
+    caption = "Category scores: mean of the class IoUs, with 95 % interval. Best of each column in bold. " + _PAPER
     return value_table("categories", caption, scores, CATEGORY_COLUMNS)
 
 
@@ -81,10 +80,7 @@ def difference_table(name: str, scores: Scores, columns: Sequence[str]) -> Table
 
 def class_values(scores: Scores) -> Table:
     """Show the classes of every row beside the paper's values and the difference to them."""
-    best = {name: _best(scores, name) for name in CLASS_NAMES}
-    bodies = tuple(_class_body(entry, best) for entry in scores.values())
-    caption = "Class IoU beside the paper's Table A1. The paper's numbers come from Cityscapes' validation set."
-    return Table("classes", caption, "Row", _headers(scores, CLASS_NAMES), bodies)
+    return value_table("classes", f"Class IoU with 95 % interval. {_PAPER}", scores, CLASS_NAMES)
 
 
 def run_differences(scores: Scores, tags: Sequence[str], columns: Sequence[str]) -> Table | None:
@@ -102,16 +98,16 @@ def run_differences(scores: Scores, tags: Sequence[str], columns: Sequence[str])
     return Table("runs", caption, "Rows", _headers(scores, columns), tuple(bodies)) if bodies else None
 
 
-def _class_body(entry: RowScores, best: dict[str, float]) -> tuple[Line, ...]:
+def _value_body(entry: RowScores, best: Mapping[str, float]) -> tuple[Line, ...]:
     values = tuple(
         value_cell(entry.estimate(name), title=_evidence(entry, name), best=entry.mean[name] == best[name])
-        for name in CLASS_NAMES
+        for name in best
     )
     lines = [Line(entry.row.name, values, title=entry.row.record.label)]
-    paper = paper_table().get(entry.row.record.name)
-    if paper is not None:
-        lines.append(Line("paper", tuple(plain_cell(paper[name]) for name in CLASS_NAMES), "paper"))
-        gaps = (entry.mean[name] - paper[name] for name in CLASS_NAMES)
+    paper = paper_table().get(entry.row.record.name, {})
+    if set(best) <= set(paper):
+        lines.append(Line("paper", tuple(plain_cell(paper[name]) for name in best), "paper"))
+        gaps = (entry.mean[name] - paper[name] for name in best)
         lines.append(Line("difference", tuple(plain_cell(gap, with_sign=True) for gap in gaps), "paper"))
     return tuple(lines)
 
@@ -119,7 +115,14 @@ def _class_body(entry: RowScores, best: dict[str, float]) -> tuple[Line, ...]:
 def _headers(scores: Scores, columns: Sequence[str]) -> tuple[tuple[str, str], ...]:
     first = next(iter(scores.values()), None)
     cells = {} if first is None else target_cells(first.row.results[0].counts)
-    return tuple((LABELS[column], f"{cells.get(column, 0):,} cells") for column in columns)
+    return tuple((LABELS[column], f"{_short_count(cells.get(column, 0))} cells") for column in columns)
+
+
+def _short_count(count: int) -> str:
+    for unit, size in (("M", 10**6), ("k", 10**4)):
+        if count >= size:
+            return f"{count / (10**6 if unit == 'M' else 10**3):.3g} {unit}"
+    return f"{count:,}"
 
 
 def _best(scores: Scores, column: str) -> float:
@@ -143,6 +146,50 @@ def _evidence(entry: RowScores, column: str) -> str:
 
 def _interval_text(difference: Estimate) -> str:
     return interval_phrase(difference, with_sign=True)
+
+
+def where_tables(found: Sequence[Where]) -> dict[str, Table | None]:
+    """Show scores by distance and by what the inputs had seen of a cell."""
+    if not found:
+        return {"distance": None, "origin": None}
+    distance = "Mean class IoU without unknown by distance from the vehicle (first repeat)."
+    origin = "Share of the target's known cells that are predicted right, by where the inputs had seen something there."
+    return {
+        "distance": _plain_table("distance", distance, BANDS, [(e.row.name, e.band_scores()) for e in found]),
+        "origin": _plain_table("origin", origin, ORIGINS, [(e.row.name, e.origin_shares()) for e in found]),
+    }
+
+
+def confusion_table(entry: RowScores, name: str) -> Table:
+    """Show how the target's classes are predicted: shares of each target class, pooled over windows and seeds."""
+    counts = sum(result.counts.sum(axis=0, dtype=np.int64) for result in entry.row.results)
+    total = np.asarray(counts).sum(axis=1, keepdims=True)
+    shares = np.divide(counts, total, out=np.full((len(CLASS_NAMES),) * 2, np.nan), where=total > 0)
+    bodies = tuple(
+        (
+            Line(
+                LABELS[target],
+                tuple(_share_cell(value, target, other) for other, value in zip(CLASS_NAMES, line, strict=True)),
+            ),
+        )
+        for target, line in zip(CLASS_NAMES, shares, strict=True)
+    )
+    caption = f"{entry.row.name}: how each class of the target (line) is predicted (column), in percent of its cells."
+    return Table(name, caption, "Target", tuple((LABELS[c], "") for c in CLASS_NAMES), bodies)
+
+
+def _share_cell(value: float, target: str, other: str) -> Cell:
+    if not np.isfinite(value):
+        return Cell(ABSENT)
+    title = f"{value:.2%} of {LABELS[target]} is predicted as {LABELS[other]}"
+    return Cell(f"{100 * value:.1f}", value, title=title, tone="heat")
+
+
+def _plain_table(
+    name: str, caption: str, columns: Sequence[str], rows: Sequence[tuple[str, NDArray[np.float64]]]
+) -> Table:
+    bodies = tuple((Line(row, tuple(plain_cell(float(value)) for value in values)),) for row, values in rows)
+    return Table(name, caption, "Row", tuple((column, "") for column in columns), bodies)
 
 
 def training_table(rows: Sequence[RowScores]) -> Table:

@@ -126,7 +126,8 @@ def test_lost_arrays_are_told_not_raised(tmp_path):
     run = make_fake_run(tmp_path / "run", recordings=2, windows=1)
     rows = _rows(run)
     contest = Contest(rows["ED-DC"], (rows["BL-DC"],))
-    (rows["ED-DC"].results[0].folder / "predictions.npz").unlink()
+    for result in rows["ED-DC"].results:
+        (result.folder / "predictions.npz").unlink()
     windows, problem = example_windows(contest, choose(contest, best=1, worst=1))
     assert windows == []
     assert "predictions.npz" in problem

@@ -57,7 +57,9 @@ def _open(browser, page, *, width):
 
 
 def _first_column(browser, table):
-    script = "return [...document.querySelectorAll(arguments[0] + ' tbody th .name')].map(e => e.textContent)"
+    script = (
+        "return [...document.querySelectorAll(arguments[0] + ' tbody tr:first-child .name')].map(e => e.textContent)"
+    )
     return browser.execute_script(script, table)
 
 
@@ -103,8 +105,8 @@ def test_a_click_sorts_and_another_turns_the_order(opened):
 
 def test_lines_of_one_row_stay_together_when_classes_are_sorted(opened):
     opened.execute_script("document.querySelectorAll('#table-classes thead button')[7].click()")
-    names = _first_column(opened, "#table-classes")
-    assert names[:3] == ["ED-DC", "paper", "difference"]
+    script = "return [...document.querySelectorAll('#table-classes tbody .name')].map(e => e.textContent)"
+    assert opened.execute_script(script)[:3] == ["ED-DC", "paper", "difference"]
 
 
 def test_the_filter_hides_rows(opened):
@@ -127,7 +129,7 @@ def test_a_table_can_be_saved_as_csv(opened):
     with target.open(newline="") as stream:
         lines = list(csv.reader(stream))
     assert lines[0][:3] == ["Row", "Static", "Static, known"]
-    assert len(lines) == 7
+    assert [line[0] for line in lines[:4]] == ["Row", "BL-DC", "paper", "difference"]
     assert 0 < float(lines[1][1]) < 1
 
 

@@ -1,0 +1,76 @@
+"""What a figure of the report is: PNG and SVG, one style, and a form that follows a page's light or dark theme."""
+
+import io
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, which colour-blind readers can tell apart; the first two are those of BL and ED.
+PALETTE = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
+STROKES = ("-", "--", ":", "-.")
+INK, RULE = "#2a2f36", "#d5d9de"
+_DARK = {INK: "#dfe3e8", RULE: "#3a4048"}
+SETTINGS: Any = {
+    "font.family": "sans-serif",
+    "font.size": 9,
+    "text.parse_math": False,  # names are text, whatever dollar signs they hold
+    "svg.fonttype": "none",
+    "svg.hashsalt": "semgrid-eval",
+    "axes.facecolor": "none",  # a page in the dark has no white boxes
+    "axes.edgecolor": RULE,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.titlesize": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "grid.color": RULE,
+    "grid.linewidth": 0.6,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.frameon": False,
+}
+_NAME_CHARACTERS = 18
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure in both forms, the table it was drawn from and what it shows in words."""
+
+    name: str
+    png: bytes
+    svg: str
+    source: str
+    caption: str
+
+    @property
+    def themed_svg(self) -> str:
+        """The SVG with colours that follow the reader's light or dark setting, and without a background."""
+        light = "".join(f"--c{i}:{colour};" for i, colour in enumerate(_DARK))
+        dark = "".join(f"--c{i}:{colour};" for i, colour in enumerate(_DARK.values()))
+        media = f"@media (prefers-color-scheme:dark){{:root{{{dark}}}}}"
+        style = f"<style>:root{{{light}}}{media}#patch_1{{display:none}}</style>"
+        text = self.svg
+        for i, colour in enumerate(_DARK):
+            text = text.replace(colour, f"var(--c{i})")
+        head, tail = text.split("<defs>", 1)
+        return f"{head}{style}<defs>{tail}"
+
+
+def short(name: str) -> str:
+    """Cut a name to what fits under a bar; control characters, which XML forbids, become spaces."""
+    name = "".join(character if character.isprintable() else " " for character in name)
+    return name if len(name) <= _NAME_CHARACTERS else f"{name[: _NAME_CHARACTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+
+
+def finish(figure: Figure, name: str, source: str, caption: str) -> Plot:
+    """Save a figure in both forms, the same figure always as the same bytes."""
+    picture, drawing = io.BytesIO(), io.BytesIO()
+    figure.savefig(picture, format="png", dpi=160, metadata={"Software": None})
+    figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})
+    text = drawing.getvalue().decode()
+    return Plot(name, picture.getvalue(), text[text.index("<svg") :], source, caption)

@@ -1,0 +1,122 @@
+"""Where a row is right: by distance, by what the inputs had seen of a cell, and by how certain the model was."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
+from semgrid_eval.errors import SemgridError
+from semgrid_eval.report.reading import Row
+from semgrid_eval.scores.iou import category_iou, class_iou
+from semgrid_eval.scores.results import read_arrays, windows_file
+
+Grid = NDArray[np.uint8]
+Counts = NDArray[np.int64]
+
+GRID_SIDE_M = 100.0
+BAND_EDGES_M = (20.0, 40.0, 60.0)
+BANDS = ("0 to 20 m", "20 to 40 m", "40 to 60 m", "beyond 60 m")
+ORIGINS = ("in the newest input", "in an older input only", "in no input")
+_LEVELS = 256
+_CHUNK = 64
+
+
+@dataclass(frozen=True)
+class Where:
+    """Counts of one row's shown result: cells (bands, origins, C, C) and certainty (256 levels, wrong and right)."""
+
+    row: Row
+    cells: Counts
+    certainty: Counts
+
+    def band_scores(self) -> NDArray[np.float64]:
+        """Mean class IoU without `unknown` in each band of distance: (bands,)."""
+        return category_iou(class_iou(self.cells.sum(axis=1)))["mean_known"]
+
+    def origin_shares(self) -> NDArray[np.float64]:
+        """Share of right cells among those the target knows, by what the inputs had seen of them: (origins,)."""
+        known = self.cells.sum(axis=0)[:, np.arange(CLASS_COUNT) != UNKNOWN]  # (origins, C - 1, C)
+        right = np.trace(known[:, :, np.arange(CLASS_COUNT) != UNKNOWN], axis1=1, axis2=2)
+        total = known.sum(axis=(1, 2))
+        return np.asarray(np.divide(right, total, out=np.full(len(ORIGINS), np.nan), where=total > 0))
+
+    def calibration(self, bins: int = 10) -> pd.DataFrame:
+        """Columns certainty, right, cells: mean certainty and share of right cells in each bin that has cells."""
+        levels = np.arange(_LEVELS)
+        place = np.minimum(levels * bins // (_LEVELS - 1), bins - 1)
+        total = self.certainty.sum(axis=1)
+        cells = np.bincount(place, total, bins)
+        right = np.bincount(place, self.certainty[:, 1], bins)
+        certainty = np.bincount(place, total * levels / (_LEVELS - 1), bins)
+        used = cells > 0
+        table = {"certainty": certainty[used] / cells[used], "right": right[used] / cells[used], "cells": cells[used]}
+        return pd.DataFrame(table).astype({"cells": "int64"})
+
+    def calibration_error(self) -> float:
+        """Mean distance between certainty and share of right cells, weighted by cells."""
+        table = self.calibration()
+        gap = (table.certainty - table.right).abs()
+        return float((gap * table.cells).sum() / table.cells.sum()) if len(table) else float("nan")
+
+
+def locate_rows(rows: Iterable[Row]) -> tuple[list[Where], list[str]]:
+    """Count where each row is right, and say of which rows the arrays cannot be read."""
+    found, problems = [], []
+    for row in rows:
+        try:
+            found.append(locate_row(row))
+        except (SemgridError, ValueError, IndexError) as error:
+            problems.append(f"{row.name}: {error}")
+    return found, problems
+
+
+def locate_row(row: Row) -> Where:
+    """Count where a row is right.
+
+    Raises:
+        ResultError: the windows or the predictions cannot be read.
+        ValueError: their shapes differ.
+    """
+    result = row.shown
+    shown = read_arrays(windows_file(row.run, result.record.windows_id), ("inputs", "target", "mask"))
+    mine = read_arrays(result.folder / "predictions.npz", ("prediction", "certainty"))
+    inputs, target = np.asarray(shown["inputs"], np.uint8), np.asarray(shown["target"], np.uint8)
+    mask = np.asarray(shown["mask"], np.bool_)
+    prediction, certainty = (np.asarray(mine[name], np.uint8) for name in ("prediction", "certainty"))
+    if not target.shape == prediction.shape == certainty.shape == mask.shape:
+        raise ValueError(f"shapes of windows {target.shape} and predictions {prediction.shape} differ")
+    cells = np.zeros((len(BANDS), len(ORIGINS), CLASS_COUNT, CLASS_COUNT), np.int64)
+    levels = np.zeros((_LEVELS, 2), np.int64)
+    for start in range(0, len(target), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        cells += count_cells(inputs[part], target[part], prediction[part], mask[part])
+        levels += count_certainty(target[part], prediction[part], certainty[part], mask[part])
+    return Where(row, cells, levels)
+
+
+def bands_of(height: int, width: int) -> NDArray[np.int64]:
+    """Number the band of each cell by its distance from the vehicle, at the middle of the bottom edge: -> (H, W)."""
+    cell_m = GRID_SIDE_M / height
+    ahead_m = (height - np.arange(height) - 0.5) * cell_m
+    left_m = (width / 2 - np.arange(width) - 0.5) * cell_m
+    return np.asarray(np.digitize(np.hypot(ahead_m[:, None], left_m[None]), BAND_EDGES_M), np.int64)
+
+
+def count_cells(inputs: Grid, target: Grid, prediction: Grid, mask: NDArray[np.bool_]) -> Counts:
+    """Count cells outside M: inputs (N, S, T, H, W), grids (N, H, W) -> (bands, origins, C, C)."""
+    seen = (inputs != UNKNOWN).any(axis=1)  # (N, T, H, W)
+    origin = np.where(seen[:, -1], 0, np.where(seen.any(axis=1), 1, 2))
+    index = bands_of(target.shape[1], target.shape[2])[None] * len(ORIGINS) + origin
+    index = (index * CLASS_COUNT + target) * CLASS_COUNT + prediction
+    shape = (len(BANDS), len(ORIGINS), CLASS_COUNT, CLASS_COUNT)
+    return np.asarray(np.bincount(index[~mask], minlength=int(np.prod(shape))).reshape(shape), np.int64)
+
+
+def count_certainty(target: Grid, prediction: Grid, certainty: Grid, mask: NDArray[np.bool_]) -> Counts:
+    """Count cells outside M that target or prediction know, by certainty: (N, H, W) each -> (256, wrong and right)."""
+    counted = ~mask & ((target != UNKNOWN) | (prediction != UNKNOWN))
+    index = certainty[counted].astype(np.int64) * 2 + (target == prediction)[counted]
+    return np.asarray(np.bincount(index, minlength=2 * _LEVELS).reshape(_LEVELS, 2), np.int64)
