@@ -83,7 +83,8 @@ def read_stamp(path: Path) -> int:
     """
     text = read_file(path).strip()
     if not text.isdigit() or len(text) > 19 or int(text) > _LAST_STAMP_NS:
-        raise InputError(f"{text[:40]!r} is no time stamp in integer nanoseconds", path=path)
+        shown = text[:40].decode(errors="replace")
+        raise InputError(f"{shown!r} is no time stamp in integer nanoseconds", path=path)
     return int(text)
 
 
@@ -134,6 +135,10 @@ def _number(content: dict[str, Any], path: Path, *place: str) -> float:
         value = value[key]
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"{str(value)[:40]!r} is no number", path=path, field=field)
-    if not math.isfinite(value):
-        raise InputError(f"{value} is not a finite number", path=path, field=field)
-    return float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"{number} is not a finite number", path=path, field=field)
+    return number

@@ -1,0 +1,108 @@
+import os
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+from support.cityscapes_tree import Tree, put
+
+from semgrid_eval.cli.convert import cityscapes, command
+from semgrid_eval.cli.main import main
+from semgrid_eval.log.check import check_log
+from semgrid_eval.log.store import LogReader, find_logs
+
+
+def run(*arguments):
+    """Run the command line and return its exit code."""
+    with pytest.raises(SystemExit) as caught:
+        main([str(argument) for argument in arguments])
+    return caught.value.code
+
+
+@pytest.fixture
+def tree(tmp_path):
+    return Tree(tmp_path / "cityscapes")
+
+
+def labelled(tree, folder):
+    for name in tree.write(range(3)):
+        put(folder / f"{name}_predLabelIds.png", tree.label())
+
+
+def test_example_of_the_help_runs(tree, tmp_path, monkeypatch, capsys):
+    labelled(tree, tmp_path / "predictions")
+    monkeypatch.chdir(tmp_path)
+    program, *arguments = shlex.split(cityscapes.epilog.removeprefix("Example: "))
+    assert program == "semgrid-eval"
+    assert run(*arguments) == 0
+    assert [path.relative_to(tmp_path) for path in find_logs(tmp_path)] == [Path("logs/val/aachen_000000_000000.mcap")]
+    assert capsys.readouterr().err.endswith("logs: 1 written, 0 up to date, 0 failed\n")
+
+
+def test_second_run_writes_nothing(tree, tmp_path, capsys):
+    tree.write(range(2))
+    arguments = ("convert", "cityscapes", tree.root, tmp_path / "logs", "--workers", 1)
+    assert run(*arguments) == 0
+    assert run(*arguments) == 0
+    assert capsys.readouterr().err.endswith("logs: 0 written, 1 up to date, 0 failed\n")
+
+
+def test_faulty_sequences_are_named_and_the_rest_is_converted(tree, tmp_path, capsys):
+    Tree(tree.root, city="bonn").write(range(2))
+    names = tree.write(range(3))
+    tree.disparity(names[1]).unlink()
+    assert run("convert", "cityscapes", tree.root, tmp_path / "logs") == 1
+    assert [path.stem for path in find_logs(tmp_path / "logs")] == ["bonn_000000_000000"]
+    said = capsys.readouterr()
+    assert f"Error: val/aachen_000000_000000: {tree.disparity(names[1])}: is missing\n" in said.err
+    assert said.out == ""
+
+
+def test_options_reach_the_log(tree, tmp_path):
+    labelled(tree, tmp_path / "labels")
+    options = ("--labels", tmp_path / "labels", "--train-ids", "--camera-name", "left", "--split", "val")
+    assert run("convert", "cityscapes", tree.root, tmp_path / "logs", *options) == 0
+    (path,) = find_logs(tmp_path / "logs")
+    with LogReader(path) as log:
+        assert log.scene.cameras == ("left",)
+        assert all(frame.label_png is not None for frame in log.frames("left"))
+
+
+def test_wrong_folder_is_one_line_without_traceback(tmp_path, capsys):
+    assert run("convert", "cityscapes", tmp_path, tmp_path / "logs") == 1
+    said = capsys.readouterr().err
+    assert said == f"Error: {tmp_path}/leftImg8bit_sequence: is no folder; a Cityscapes sequence tree has one\n"
+
+
+def test_help_works_though_the_synthetic_extra_is_missing(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "semgrid_eval.cli.convert_synthetic", None)
+    assert run("convert", "--help") == 0
+    assert "needs the extra 'synthetic'" in capsys.readouterr().out
+    assert run("convert", "synthetic", "logs", "--recordings", 3) == 1
+    assert "run: pip install 'semgrid-eval[synthetic]'" in capsys.readouterr().err
+
+
+def test_sources_are_listed():
+    assert command.list_commands(None) == ["cityscapes", "synthetic"]
+
+
+@pytest.mark.skipif(
+    "SEMGRID_REAL_DATA" not in os.environ, reason="SEMGRID_REAL_DATA names no folder of real recordings"
+)
+def test_real_recordings_are_converted_without_a_finding(tmp_path):
+    source = Path(os.environ["SEMGRID_REAL_DATA"])
+    labels = source / "pred_sequence"
+    assert run("convert", "cityscapes", source, tmp_path, "--labels", labels) == 0
+    paths = find_logs(tmp_path)
+    images = list((source / "leftImg8bit_sequence").glob("*/*/*_leftImg8bit.png"))
+    total = 0
+    for path in paths:
+        assert check_log(path).findings == ()
+        with LogReader(path) as log:
+            frames = list(log.frames("front", images=True))
+            total += len(frames)
+            assert len(log.motion()) == len(frames)
+            assert all(frame.label_png is not None for frame in frames)
+            first = source / "leftImg8bit_sequence" / log.scene.split
+            assert frames[0].image_png == next(first.glob(f"*/{log.scene.name}_leftImg8bit.png")).read_bytes()
+    assert total == len(images)

@@ -1,0 +1,169 @@
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.driving import CALIBRATION, FRAME_NS, driving
+
+from semgrid_eval.frames.png import encode_gray
+from semgrid_eval.log.check import Severity, check_log
+from semgrid_eval.log.store import write_log
+
+# Every frame of this recording has all pictures, and nothing about it is odd.
+
+
+def smooth(change=lambda number, moment: moment, frames=8):
+    """Moments of a plain drive, each changed by `change`."""
+    full = next(driving().moments()).cameras["front"]
+    for number, moment in enumerate(driving(frames=frames).moments()):
+        sample = replace(moment.motion[0], speed_mps=8.0, yaw_rate_radps=0.1)
+        frame = replace(full, stamp_ns=moment.stamp_ns)
+        yield change(number, replace(moment, motion=(sample,), cameras={"front": frame}))
+
+
+def findings(tmp_path, change=lambda number, moment: moment, **changes):
+    path = tmp_path / "log.mcap"
+    write_log(replace(driving(), moments=lambda: smooth(change), **changes), path)
+    report = check_log(path)
+    return {finding.place: (finding.severity, finding.message) for finding in report.findings}
+
+
+def with_frame(moment, **changes):
+    return replace(moment, cameras={"front": replace(moment.cameras["front"], **changes)})
+
+
+def with_motion(moment, **changes):
+    return replace(moment, motion=(replace(moment.motion[0], **changes),))
+
+
+def test_good_log_has_no_findings_and_its_messages_are_counted(tmp_path):
+    assert findings(tmp_path) == {}
+    report = check_log(tmp_path / "log.mcap")
+    assert report.good
+    assert report.counts["/camera/front/disparity"] == 8
+    assert report.counts["/tf"] == 8
+    assert report.duration_s == pytest.approx(7 * FRAME_NS / 1e9)
+
+
+def test_any_damage_is_an_error(tmp_path):
+    write_log(replace(driving(), moments=smooth), tmp_path / "log.mcap")
+    whole = (tmp_path / "log.mcap").read_bytes()
+    chance = random.Random(1)
+    for _ in range(60):
+        data = bytearray(whole)
+        data[chance.randrange(len(data))] ^= 1 << chance.randrange(8)
+        (tmp_path / "log.mcap").write_bytes(data)
+        report = check_log(tmp_path / "log.mcap")
+        assert not report.good
+        assert report.findings[0].place == "file"
+    (tmp_path / "log.mcap").write_bytes(whole[:-100])
+    assert "its end is missing" in check_log(tmp_path / "log.mcap").findings[0].message
+
+
+def test_missing_labels_and_images_are_counted(tmp_path):
+    def change(number, moment):
+        return with_frame(moment, label_png=None) if number < 3 else with_frame(moment, image_png=None)
+
+    assert findings(tmp_path, change) == {
+        "/camera/front/label": (Severity.WARNING, "is missing for 3 of 8 disparity images"),
+        "/camera/front/image": (Severity.WARNING, "is missing for 5 of 8 disparity images"),
+    }
+
+
+def test_log_without_frames_or_motion_is_an_error(tmp_path):
+    found = findings(tmp_path, lambda number, moment: replace(moment, cameras={}, motion=()))
+    assert found["/camera/front/disparity"] == (Severity.ERROR, "has no message")
+    assert found["/ego/motion"] == (Severity.ERROR, "has no message")
+
+
+def shifted(moment, by_ns):
+    stamp_ns = moment.stamp_ns + by_ns
+    moment = replace(with_frame(moment, stamp_ns=stamp_ns), stamp_ns=stamp_ns)
+    return with_motion(moment, stamp_ns=stamp_ns)
+
+
+def test_gap_in_time_is_a_warning(tmp_path):
+    found = findings(tmp_path, lambda number, moment: shifted(moment, FRAME_NS * 4 if number > 5 else 0))
+    expected = (Severity.WARNING, "has 1 gaps at a period of 0.059 s; the longest is 0.294 s")
+    assert found == {"/camera/front/disparity": expected, "/ego/motion": expected}
+
+
+def test_jitter_is_a_warning(tmp_path):
+    found = findings(tmp_path, lambda number, moment: shifted(moment, FRAME_NS // 5 * (number % 2)))
+    assert "vary by" in found["/camera/front/disparity"][1]
+
+
+def test_repeated_time_is_an_error(tmp_path):
+    found = findings(tmp_path, lambda number, moment: shifted(moment, -FRAME_NS if number == 5 else 0))
+    assert found["/ego/motion"] == (Severity.ERROR, "1 messages have the time of the message before")
+    assert found["/camera/front/disparity"][0] is Severity.ERROR
+
+
+def test_frames_outside_the_time_of_the_motion_are_a_warning(tmp_path):
+    found = findings(tmp_path, lambda number, moment: replace(moment, motion=()) if number == 7 else moment)
+    assert found == {"/ego/motion": (Severity.WARNING, "does not cover the time of all frames of camera front")}
+
+
+@pytest.mark.parametrize(
+    ("changes", "place", "severity"),
+    [
+        ({"speed_mps": 90.0}, "speed_mps", Severity.ERROR),
+        ({"speed_mps": -30.0}, "speed_mps", Severity.ERROR),
+        ({"yaw_rate_radps": 5.7}, "yaw_rate_radps", Severity.ERROR),
+    ],
+)
+def test_impossible_motion_is_an_error(tmp_path, changes, place, severity):
+    found = findings(tmp_path, lambda number, moment: with_motion(moment, **changes))
+    assert found[f"/ego/motion: {place}"][0] is severity
+
+
+def test_jump_in_speed_is_a_warning(tmp_path):
+    found = findings(tmp_path, lambda number, moment: with_motion(moment, speed_mps=20.0 if number == 4 else 8.0))
+    assert found["/ego/motion: speed_mps"][0] is Severity.WARNING
+
+
+@pytest.mark.parametrize("speed_mps", [float("nan"), float("inf")])
+def test_motion_that_is_no_number_is_an_error(tmp_path, speed_mps):
+    path = tmp_path / "log.mcap"
+    samples = smooth(lambda number, moment: with_motion(moment, speed_mps=speed_mps) if number == 3 else moment)
+    write_log(replace(driving(), moments=lambda: samples), path)
+    assert not check_log(path).good
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "place"),
+    [
+        ("fx_px", 2262.0, "fx_px / width"),
+        ("fy_px", 140.0, "fy_px / fx_px"),
+        ("v0_px", 400.0, "v0_px / height"),
+        ("baseline_m", 209.0, "baseline_m"),
+        ("z_m", -1.2, "z_m"),
+        ("pitch_rad", 2.2, "pitch_rad"),
+    ],
+)
+def test_implausible_calibration_is_a_warning(tmp_path, field, value, place):
+    found = findings(tmp_path, calibrations={"front": replace(CALIBRATION, **{field: value})})
+    assert found[f"/camera/front/calibration: {place}"][0] is Severity.WARNING
+
+
+def test_pictures_of_different_size_are_an_error(tmp_path):
+    small = encode_gray(np.zeros((16, 32), np.uint8))
+    found = findings(tmp_path, lambda number, moment: with_frame(moment, label_png=small) if number == 6 else moment)
+    severity, message = found["camera front"]
+    assert severity is Severity.ERROR
+    assert message.endswith("ns: label: is 32 x 16, not 64 x 32")
+
+
+def test_empty_disparity_is_a_warning(tmp_path):
+    empty = encode_gray(np.zeros((32, 64), np.uint16))
+    found = findings(tmp_path, lambda number, moment: with_frame(moment, disparity_png=empty))
+    assert found["/camera/front/disparity"] == (
+        Severity.WARNING,
+        "one frame has a disparity at only 0.0 % of its pixels",
+    )
+
+
+def test_values_that_are_no_labels_are_a_warning(tmp_path):
+    train_ids = encode_gray(np.full((32, 64), 255, np.uint8))
+    found = findings(tmp_path, lambda number, moment: with_frame(moment, label_png=train_ids))
+    assert "[255], which are no Cityscapes label ids" in found["/camera/front/label"][1]

@@ -1,0 +1,91 @@
+import os
+import signal
+from functools import partial
+
+import pytest
+from support.driving import driving
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.log.convert import ConversionJob, convert_recordings
+from semgrid_eval.log.store import LogReader
+from semgrid_eval.progress import silent
+
+
+def refuse(reason):
+    raise InputError(reason, path="camera.json", field="intrinsic.fx")
+
+
+def die():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def job(name, load=driving, digest="d" * 16):
+    return ConversionJob(name=name, split="val", digest=digest, load=load)
+
+
+def convert(jobs, out, workers=1):
+    return convert_recordings(jobs, out, workers=workers, progress=silent)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_good_recordings_are_written_though_others_fail(tmp_path, workers):
+    bad = job("bad", partial(refuse, "is missing"))
+    worse = job("worse", digest=partial(refuse, "is broken"))
+    summary = convert([job("b"), bad, job("a"), worse], tmp_path, workers)
+    assert summary.written == ["val/a", "val/b"]
+    assert summary.failed == {
+        "val/bad": "camera.json: intrinsic.fx: is missing",
+        "val/worse": "camera.json: intrinsic.fx: is broken",
+    }
+    assert sorted(path.name for path in (tmp_path / "val").iterdir()) == ["a.mcap", "b.mcap"]
+    assert (tmp_path / "val/a.mcap").read_bytes() == (tmp_path / "val/b.mcap").read_bytes()
+
+
+def test_logs_of_unchanged_inputs_are_left_as_they_are(tmp_path):
+    convert([job("a"), job("b")], tmp_path)
+    before = (tmp_path / "val/a.mcap").stat()
+    summary = convert([job("a"), job("b", digest="d".replace("d", "d" * 16).format)], tmp_path)
+    assert (summary.written, summary.skipped) == ([], ["val/a", "val/b"])
+    assert (tmp_path / "val/a.mcap").stat() == before
+
+
+def test_logs_of_changed_inputs_are_written_again(tmp_path):
+    convert([job("a")], tmp_path)
+    changed = job("a", partial(driving, digest="e" * 16), digest="e" * 16)
+    assert convert([changed], tmp_path).written == ["val/a"]
+    with LogReader(tmp_path / "val/a.mcap") as log:
+        assert log.scene.source_digest == "e" * 16
+
+
+@pytest.mark.parametrize("place", [0, 0.3, 0.6, -1])
+def test_damaged_logs_are_written_again(tmp_path, place):
+    convert([job("a")], tmp_path)
+    path = tmp_path / "val/a.mcap"
+    whole = path.read_bytes()
+    damaged = bytearray(whole)
+    damaged[place if place in (0, -1) else int(place * len(whole))] ^= 1
+    path.write_bytes(damaged)
+    assert convert([job("a")], tmp_path).written == ["val/a"]
+    assert path.read_bytes() == whole
+
+
+def test_two_recordings_of_one_name_are_refused(tmp_path):
+    with pytest.raises(InputError, match="val/a: two recordings have this name"):
+        convert([job("a"), job("a")], tmp_path)
+
+
+def test_killed_worker_is_a_failure_that_is_named(tmp_path):
+    summary = convert([job("a", die), job("b", die)], tmp_path, workers=2)
+    assert set(summary.failed) == {"val/a", "val/b"}
+    assert "worker process was killed" in summary.failed["val/a"]
+
+
+def test_progress_names_every_recording_once(tmp_path):
+    told = []
+    jobs = [job("a"), job("b", partial(refuse, "is missing"))]
+    convert_recordings(jobs, tmp_path, workers=1, progress=lambda *call: told.append(call))
+    assert told == [(1, 2, "val/a"), (2, 2, "val/b")]
+
+
+def test_nothing_to_convert_is_no_error(tmp_path):
+    assert convert([], tmp_path, workers=2).written == []
