@@ -69,6 +69,8 @@ def short(name: str) -> str:
 
 def finish(figure: Figure, name: str, source: str, caption: str) -> Plot:
     """Save a figure in both forms, the same figure always as the same bytes."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # it has done its work; without this, each form would be laid out again
     picture, drawing = io.BytesIO(), io.BytesIO()
     figure.savefig(picture, format="png", dpi=160, metadata={"Software": None})
     figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})

@@ -119,14 +119,6 @@ def test_the_same_run_gives_the_same_bytes(run, page, tmp_path):
     assert filecmp.cmpfiles(page.parent, again, names, shallow=False) == (names, [], [])
 
 
-def test_the_default_place_is_in_the_run_and_is_replaced(tmp_path):
-    first = _report_of(tmp_path, rows=(FakeRow("DC", "BL"),))
-    assert first == tmp_path / "run" / "report" / "index.html"
-    (first.parent / "old.txt").touch()
-    write_report(tmp_path / "run")
-    assert not (first.parent / "old.txt").exists()
-
-
 def test_a_folder_that_is_no_report_is_left_alone(run, tmp_path):
     (tmp_path / "thesis.tex").write_text("precious")
     with pytest.raises(InputError, match="no report"):
@@ -147,8 +139,15 @@ def test_failed_rows_only(tmp_path):
     assert pd.read_csv(page.parent / "classes.csv").empty
 
 
-def test_one_row_only(tmp_path):
-    text = _read(_report_of(tmp_path, rows=(FakeRow("DC", "BL"),))).text
+def test_one_row_only_in_the_default_place_where_an_old_report_is_replaced(tmp_path):
+    old = tmp_path / "run" / "report"
+    old.mkdir(parents=True)
+    (old / "report.json").touch()
+    (old / "old.txt").touch()
+    page = _report_of(tmp_path, rows=(FakeRow("DC", "BL"),))
+    assert page == old / "index.html"
+    assert not (old / "old.txt").exists()
+    text = _read(page).text
     assert "BL-DC predicts best" in text
     assert "no other kind of model to compare with" in text
     assert "No row was trained" in text
@@ -173,7 +172,8 @@ def test_a_class_in_neither_target_nor_prediction_is_a_dash_and_empty(tmp_path):
 
 
 def test_a_damaged_result_fails_its_row_and_the_rest_goes_on(tmp_path):
-    run = make_fake_run(tmp_path / "run", recordings=2, windows=1)
+    rows = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 1))
+    run = make_fake_run(tmp_path / "run", rows=rows, recordings=2, windows=1)
     victim = read_run(run).rows[0].results[0]
     (run / "results" / victim / "counts.npz").write_bytes(b"not a zip")
     text = _read(write_report(run)).text
@@ -201,7 +201,7 @@ def test_names_are_shown_as_text(tmp_path):
 
 
 def test_several_runs_are_shown_side_by_side(run, tmp_path):
-    other = make_fake_run(tmp_path / "other", rows=(FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.3, 1)))
+    other = make_fake_run(tmp_path / "other", rows=(FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.3, 1)), windows=1)
     page = write_report([run, other], tmp_path / "both")
     text = _read(page).text
     assert "ED-DC (other) \N{MINUS SIGN} ED-DC (run)" in text

@@ -57,10 +57,8 @@ def _open(browser, page, *, width):
 
 
 def _first_column(browser, table):
-    script = (
-        "return [...document.querySelectorAll(arguments[0] + ' tbody tr:first-child .name')].map(e => e.textContent)"
-    )
-    return browser.execute_script(script, table)
+    script = "return [...document.querySelectorAll(arguments[0])].map(each => each.textContent)"
+    return browser.execute_script(script, f"{table} tbody tr:first-child .name")
 
 
 def test_tables_and_pictures_are_shown_without_error_or_request(opened, page):
