@@ -15,8 +15,8 @@ _PLAIN, _GLASSY = Texture.PLAIN, Texture.GLASS
 _STRIDE_HZ = 1.7
 _STRIDE_M = 0.22
 
-# Each part: x, y of its base's centre; bottom, top; length, width; length, width, shift of its top (all as shares of the
-# actor's length, width and height); label; texture; which of the actor's colours; direction of swinging when walking.
+# Each part: x, y of its base's centre; bottom, top; length, width; length, width, shift of its top (all as shares of
+# the actor's length, width and height); label; texture; which of the actor's colours; way of swinging when walking.
 _Part = tuple[float, float, float, float, float, float, float, float, float, int, int, int, int]
 
 
@@ -58,9 +58,9 @@ _PARTS: dict[Shape, list[_Part]] = {
         *_wheels(0.29, 0.31, 0.08),
     ],
     Shape.BICYCLE: [
-        (0.30, 0, 0.0, 0.38, 0.36, 0.09, 0.36, 0.09, 0.0, _OWN, _PLAIN, _DARK, 0),
-        (-0.30, 0, 0.0, 0.38, 0.36, 0.09, 0.36, 0.09, 0.0, _OWN, _PLAIN, _DARK, 0),
-        (0.0, 0, 0.20, 0.50, 0.34, 0.10, 0.52, 0.10, 0.03, _OWN, _PLAIN, _MAIN, 0),
+        (0.30, 0, 0.0, 0.38, 0.36, 0.13, 0.36, 0.13, 0.0, _OWN, _PLAIN, _DARK, 0),
+        (-0.30, 0, 0.0, 0.38, 0.36, 0.13, 0.36, 0.13, 0.0, _OWN, _PLAIN, _DARK, 0),
+        (0.0, 0, 0.20, 0.50, 0.34, 0.16, 0.52, 0.16, 0.03, _OWN, _PLAIN, _MAIN, 0),
         (0.25, 0, 0.50, 0.59, 0.05, 0.80, 0.05, 0.80, -0.03, _OWN, _PLAIN, _DARK, 0),
         (0.04, 0.18, 0.16, 0.56, 0.13, 0.22, 0.15, 0.24, -0.10, _RIDER, _PLAIN, _DARK, 1),
         (0.04, -0.18, 0.16, 0.56, 0.13, 0.22, 0.15, 0.24, -0.10, _RIDER, _PLAIN, _DARK, -1),
@@ -77,13 +77,33 @@ _PARTS: dict[Shape, list[_Part]] = {
     ],
 }
 _PAINT = np.array(
-    [(200, 200, 198), (28, 29, 32), (120, 124, 130), (60, 66, 78), (150, 30, 28), (32, 52, 110), (215, 213, 205), (82, 84, 86)]
-    + [(46, 78, 62), (170, 150, 120)],
+    [
+        (200, 200, 198),
+        (28, 29, 32),
+        (120, 124, 130),
+        (60, 66, 78),
+        (150, 30, 28),
+        (32, 52, 110),
+        (215, 213, 205),
+        (82, 84, 86),
+        (46, 78, 62),
+        (170, 150, 120),
+    ],
     np.uint8,
 )
 _CLOTH = np.array(
-    [(60, 70, 110), (120, 40, 40), (40, 42, 46), (150, 140, 120), (70, 100, 80), (190, 185, 175), (170, 120, 40), (95, 70, 110)]
-    + [(30, 60, 90), (205, 190, 60)],
+    [
+        (60, 70, 110),
+        (120, 40, 40),
+        (40, 42, 46),
+        (150, 140, 120),
+        (70, 100, 80),
+        (190, 185, 175),
+        (170, 120, 40),
+        (95, 70, 110),
+        (30, 60, 90),
+        (205, 190, 60),
+    ],
     np.uint8,
 )
 _FIXED_COLOURS = {_DARK: (34, 35, 38), _GLASS: (46, 54, 62), _SKIN: (196, 152, 126), _RED: (150, 22, 20)}
@@ -96,24 +116,21 @@ def heights_m(actor: NDArray[np.int32], type_index: NDArray[np.uint8]) -> NDArra
     return np.where(is_person, nominal * (0.84 + 0.24 * _drawn(actor, 1)), nominal)
 
 
-def boxes_of(snapshot: Snapshot, instance: NDArray[np.uint16], time_s: float) -> NDArray[np.void]:
-    """Return the rows of `BOX` that make up the actors of a snapshot.
+def actor_ids(actors: Snapshot) -> NDArray[np.int32]:
+    """Return the ids (A,) of actors, which their pixels in the instance image have; 0 means no actor."""
+    return actors.actor + 1
 
-    Args:
-        snapshot: A actors.
-        instance: (A,) value of their pixels in the instance image.
-        time_s: moves the legs of those who walk or ride.
-    """
+
+def boxes_of(snapshot: Snapshot, time_s: float) -> NDArray[np.void]:
+    """Return the rows of `BOX` that make up the actors of a snapshot; the time moves the legs of those who walk."""
     shapes = np.array([user.shape for user in ROAD_USERS])[snapshot.type_index]
     parts = [
-        _posed(_PARTS[shape], snapshot.where(shapes == shape), instance[shapes == shape], time_s)
-        for shape in Shape
-        if np.any(shapes == shape)
+        _posed(_PARTS[shape], snapshot.where(shapes == shape), time_s) for shape in Shape if np.any(shapes == shape)
     ]
     return np.concatenate(parts) if parts else np.empty(0, BOX)
 
 
-def _posed(parts: list[_Part], actors: Snapshot, instance: NDArray[np.uint16], time_s: float) -> NDArray[np.void]:
+def _posed(parts: list[_Part], actors: Snapshot, time_s: float) -> NDArray[np.void]:
     """Pose P parts for A actors of one shape: A * P rows."""
     part = np.array(parts)[None]  # (1, P, 13)
     users = [ROAD_USERS[index] for index in actors.type_index]
@@ -128,15 +145,22 @@ def _posed(parts: list[_Part], actors: Snapshot, instance: NDArray[np.uint16], t
     rows["y_m"] = actors.centre_m[:, 1:] + sin * ahead_m + cos * left_m
     rows["yaw_rad"] = actors.yaw_rad[:, None]
     for column, (name, scale) in enumerate(
-        [("bottom_m", height), ("top_m", height), ("length_m", length), ("width_m", width)]
-        + [("top_length_m", length), ("top_width_m", width), ("top_shift_m", length)],
+        [
+            ("bottom_m", height),
+            ("top_m", height),
+            ("length_m", length),
+            ("width_m", width),
+            ("top_length_m", length),
+            ("top_width_m", width),
+            ("top_shift_m", length),
+        ],
         start=2,
     ):
         rows[name] = part[..., column] * scale
     own = np.array([user.label_id for user in users])[:, None]
     rows["label"] = np.where(part[..., 9] == _OWN, own, part[..., 9])
     rows["texture"] = part[..., 10]
-    rows["instance"] = instance[:, None]
+    rows["instance"] = actor_ids(actors)[:, None]
     rows["colour"] = _colours(actors)[:, part[0, :, 11].astype(int)]
     return rows.ravel()
 
@@ -145,7 +169,7 @@ def _stride_m(actors: Snapshot, time_s: float) -> NDArray[np.float64]:
     """Return how far (A,) the left leg is ahead: nothing for those who stand."""
     speed = np.linalg.norm(actors.velocity_mps, axis=1)
     phase = 2.0 * np.pi * (_STRIDE_HZ * time_s + _drawn(actors.actor, 2))
-    return _STRIDE_M * np.clip(speed / 1.3, 0.0, 1.0) * np.sin(phase)
+    return np.asarray(_STRIDE_M * np.clip(speed / 1.3, 0.0, 1.0) * np.sin(phase))
 
 
 def _colours(actors: Snapshot) -> NDArray[np.uint8]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.frames.synthetic.motion import MAX_YAW_RATE_RADPS, Path, drive
+from semgrid_eval.frames.synthetic.motion import MAX_YAW_RATE_RADPS, Trajectory, drive
 from semgrid_eval.frames.synthetic.road_users import ROAD_USERS
 from semgrid_eval.frames.synthetic.traffic import Traffic
 
@@ -33,7 +33,7 @@ class Drive:
     start_s: float
 
 
-def ego_path(traffic: Traffic, chosen: Drive) -> Path | None:
+def ego_path(traffic: Traffic, chosen: Drive) -> Trajectory | None:
     """Return the rear axle's path around a window, or None where the track is not one that a car drives."""
     first = traffic.step_before(chosen.start_s) - _LEAD_STEPS
     end = first + _LEAD_STEPS + _WINDOW_STEPS + _TAIL_STEPS

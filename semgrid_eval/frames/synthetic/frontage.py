@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.frames.synthetic.ground import CELL_M, Ground, Surface
@@ -16,10 +15,18 @@ from semgrid_eval.frames.synthetic.trees import Tree, draw_bush, draw_tree
 
 _BUILDING, _WALL, _FENCE, _HEDGE = (LABEL_ID[name] for name in ("building", "wall", "fence", "vegetation"))
 _FLOOR_M = 3.1
-_FACADES = (
-    [(176, 158, 132), (150, 92, 74), (196, 188, 172), (132, 126, 120), (188, 166, 112), (122, 82, 70), (164, 150, 142)]
-    + [(206, 198, 182), (142, 134, 108), (108, 110, 116)]
-)
+_FACADES = [
+    (176, 158, 132),
+    (150, 92, 74),
+    (196, 188, 172),
+    (132, 126, 120),
+    (188, 166, 112),
+    (122, 82, 70),
+    (164, 150, 142),
+    (206, 198, 182),
+    (142, 134, 108),
+    (108, 110, 116),
+]
 _ROOFS = ((110, 62, 52), (74, 72, 74), (96, 84, 76), (60, 62, 68))
 _TOLERANCE_M = 0.8  # by which houses of a bent row may overlap, and their facades touch the sidewalk
 _OCCUPANCY_STEP = 2  # ground cells a cell of the map of what is taken
@@ -151,7 +158,11 @@ def _close_front(
         return
     start_m, end_m = max(span_m[0], 0.0), min(span_m[1] - float(rng.uniform(1.2, 3.5)), line.length_m)
     if drawn < kind.hedges:
-        thickness_m, height_m, look = float(rng.uniform(0.6, 1.2)), float(rng.uniform(0.8, 2.0)), (_HEDGE, Texture.FOLIAGE, (66, 88, 46))
+        thickness_m, height_m, look = (
+            float(rng.uniform(0.6, 1.2)),
+            float(rng.uniform(0.8, 2.0)),
+            (_HEDGE, Texture.FOLIAGE, (66, 88, 46)),
+        )
     elif rng.random() < 0.5:
         thickness_m, height_m, look = 0.3, float(rng.uniform(0.7, 2.0)), (_WALL, Texture.ROOF, (150, 138, 124))
     else:
@@ -164,7 +175,13 @@ def _close_front(
 
 
 def _plant(
-    line: Polyline, s_m: float, width_m: float, edge_m: float, plots: Plots, rng: np.random.Generator, frontage: Frontage
+    line: Polyline,
+    s_m: float,
+    width_m: float,
+    edge_m: float,
+    plots: Plots,
+    rng: np.random.Generator,
+    frontage: Frontage,
 ) -> None:
     """Put trees and bushes on an open parcel."""
     for _ in range(int(rng.integers(1, 5))):

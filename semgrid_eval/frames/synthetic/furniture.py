@@ -12,6 +12,7 @@ from semgrid_eval.frames.synthetic.trees import Tree, draw_tree
 
 ParkedCar = tuple[int, float, float, float]  # type index, x, y, yaw
 _POLE, _SIGN, _LIGHT = LABEL_ID["pole"], LABEL_ID["traffic sign"], LABEL_ID["traffic light"]
+_BICYCLE = LABEL_ID["bicycle"]
 _GREY, _WHITE, _BLACK = (112, 114, 116), (210, 210, 206), (30, 32, 34)
 _SIGN_COLOURS = ((196, 38, 34), (36, 74, 158), (228, 196, 60), (210, 210, 206))
 _CURB_M = 0.55  # from the curb to the middle of what stands on the sidewalk
@@ -44,7 +45,7 @@ def furnish_streets(network: Network, kind: TownKind, rng: np.random.Generator) 
     trees: list[Tree] = []
     for lane in network.lanes:
         if lane.use is LaneUse.SIDEWALK:
-            boxes += _lamps(lane, rng) + _signs(lane, rng) + _bollards(lane, rng)
+            boxes += _lamps(lane, rng) + _signs(lane, rng) + _bollards(lane, rng) + _parked_bicycles(lane, rng)
             if lane.ends_at_light:
                 boxes += _traffic_light(lane)
             if rng.random() < kind.tree_rows:
@@ -63,9 +64,13 @@ def _lamps(lane: Lane, rng: np.random.Generator) -> list[BoxRow]:
     height_m = float(rng.uniform(5.0, 8.5))
     for s_m in np.arange(float(rng.uniform(5.0, 14.0)), line.length_m - 3.0, float(rng.uniform(22.0, 32.0))):
         x_m, y_m, yaw_rad = line.at(float(s_m), _curb(lane))
-        boxes.append(box((x_m, y_m, yaw_rad), (0.0, height_m), (0.2, 0.2), (_POLE, Texture.PLAIN, _GREY), top_size_m=(0.1, 0.1)))
+        boxes.append(
+            box((x_m, y_m, yaw_rad), (0.0, height_m), (0.2, 0.2), (_POLE, Texture.PLAIN, _GREY), top_size_m=(0.1, 0.1))
+        )
         arm_x, arm_y, _ = line.at(float(s_m), _curb(lane) + 0.7)
-        boxes.append(box((arm_x, arm_y, yaw_rad), (height_m - 0.1, height_m + 0.1), (0.3, 1.5), (_POLE, Texture.PLAIN, _GREY)))
+        boxes.append(
+            box((arm_x, arm_y, yaw_rad), (height_m - 0.1, height_m + 0.1), (0.3, 1.5), (_POLE, Texture.PLAIN, _GREY))
+        )
     return boxes
 
 
@@ -90,6 +95,37 @@ def _bollards(lane: Lane, rng: np.random.Generator) -> list[BoxRow]:
     line = Polyline.through(lane.line_m)
     places = [line.at(float(s_m), lane.width_m / 2.0 - 0.35) for s_m in np.arange(1.0, min(12.0, line.length_m), 1.8)]
     return [box(place, (0.0, 0.95), (0.16, 0.16), (_POLE, Texture.PLAIN, _WHITE)) for place in places]
+
+
+def _parked_bicycles(lane: Lane, rng: np.random.Generator) -> list[BoxRow]:
+    """Return rows of bicycles that lean across the curb, one to six in a row."""
+    line = Polyline.through(lane.line_m)
+    boxes: list[BoxRow] = []
+    s_m = float(rng.uniform(4.0, 40.0))
+    while s_m < line.length_m - 4.0:
+        for _ in range(int(rng.integers(1, 7))):
+            x_m, y_m, yaw_rad = line.at(s_m, _curb(lane) - 0.4)
+            boxes += _bicycle((x_m, y_m, yaw_rad + float(rng.normal(1.2, 0.2))), rng)
+            s_m += float(rng.uniform(0.55, 0.9))
+        s_m += float(rng.uniform(12.0, 45.0))
+    return boxes
+
+
+def _bicycle(place: tuple[float, float, float], rng: np.random.Generator) -> list[BoxRow]:
+    x_m, y_m, yaw_rad = place
+    frame = (_BICYCLE, Texture.PLAIN, _SIGN_COLOURS[int(rng.integers(len(_SIGN_COLOURS)))])
+    dark = (_BICYCLE, Texture.PLAIN, _BLACK)
+    parts = [
+        (0.52, (0.0, 0.66), (0.62, 0.06), dark),
+        (-0.52, (0.0, 0.66), (0.62, 0.06), dark),
+        (0.0, (0.35, 0.85), (0.95, 0.08), frame),
+        (0.42, (0.9, 1.02), (0.08, 0.5), dark),
+    ]
+    cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+    return [
+        box((x_m + cos * along, y_m + sin * along, yaw_rad), heights, size, look)
+        for along, heights, size, look in parts
+    ]
 
 
 def _traffic_light(lane: Lane) -> list[BoxRow]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -48,6 +49,12 @@ _COLOURS = {
     Surface.CROSSING: (200, 200, 196),
     Surface.BICYCLE_LANE: (112, 78, 72),
     Surface.PARKING: (104, 102, 102),
+}
+_LANE_SURFACES = {  # in the order of drawing
+    LaneUse.PARKING: Surface.PARKING,
+    LaneUse.BICYCLE: Surface.BICYCLE_LANE,
+    LaneUse.CAR: Surface.ROAD,
+    LaneUse.SIDEWALK: Surface.SIDEWALK,
 }
 SURFACE_LABELS = np.array([LABEL_ID[_LABELS[surface]] for surface in Surface], np.uint8)
 SURFACE_COLOURS = np.array([_COLOURS[surface] for surface in Surface], np.uint8)
@@ -105,7 +112,7 @@ class GroundPainter:
 
     def line(self, points_m: NDArray[np.float64], width_m: float, surface: Surface) -> None:
         """Draw a line (N, 2) of some width, with square joints where it bends."""
-        for start, end in zip(points_m[:-1], points_m[1:], strict=True):
+        for start, end in pairwise(points_m):
             length = np.linalg.norm(end - start)
             if length > 0.0:
                 ahead = (end - start) / length
@@ -128,17 +135,12 @@ def paint_streets(network: Network, painter: GroundPainter) -> None:
     """Draw all streets of a town: junctions, lanes, markings, sidewalks, crossings, in this order."""
     for shape_m in network.junctions_m:
         painter.polygon(shape_m, Surface.ROAD)
-    surfaces = {LaneUse.CAR: Surface.ROAD, LaneUse.PARKING: Surface.PARKING, LaneUse.BICYCLE: Surface.BICYCLE_LANE}
-    for use, surface in surfaces.items():
-        for lane in network.lanes:
-            if lane.use is use:
-                painter.line(lane.line_m, lane.width_m + CELL_M, surface)
-    for lane in network.lanes:
-        if lane.use is LaneUse.CAR:
+    for use, surface in _LANE_SURFACES.items():
+        lanes = [lane for lane in network.lanes if lane.use is use]
+        for lane in lanes:
+            painter.line(lane.line_m, lane.width_m + CELL_M, surface)
+        for lane in lanes if use is LaneUse.CAR else ():
             _paint_markings(lane, painter)
-    for lane in network.lanes:
-        if lane.use is LaneUse.SIDEWALK:
-            painter.line(lane.line_m, lane.width_m + CELL_M, Surface.SIDEWALK)
     for shape_m in network.walking_areas_m:
         painter.polygon(shape_m, Surface.SIDEWALK)
     for line_m, width_m in network.crossings:

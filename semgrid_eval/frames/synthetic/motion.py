@@ -12,7 +12,7 @@ _MAX_STEP_M = 1.2  # 20 m/s at 17 Hz; what goes farther was moved by SUMO, not d
 
 
 @dataclass(frozen=True)
-class Path:
+class Trajectory:
     """The rear axle's path on the clock of the simulation.
 
     Args:
@@ -60,7 +60,9 @@ class MotionNoise:
 EXACT_MOTION = MotionNoise(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def drive(times_s: NDArray[np.float64], front_m: NDArray[np.float64], heading_rad: NDArray[np.float64]) -> Path | None:
+def drive(
+    times_s: NDArray[np.float64], front_m: NDArray[np.float64], heading_rad: NDArray[np.float64]
+) -> Trajectory | None:
     """Turn a front bumper's track into the path of the rear axle, or None where the track jumps or breaks off.
 
     The track is smoothed, then the rear axle follows it as a wheel does: it always moves along the vehicle's heading,
@@ -84,11 +86,11 @@ def drive(times_s: NDArray[np.float64], front_m: NDArray[np.float64], heading_ra
     yaw = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
     velocity = np.gradient(rear, step_s, axis=0)
     speed = velocity[:, 0] * np.cos(yaw) + velocity[:, 1] * np.sin(yaw)
-    return Path(times_s, rear, yaw, speed, np.gradient(yaw, step_s))
+    return Trajectory(times_s, rear, yaw, speed, np.gradient(yaw, step_s))
 
 
 def report(
-    path: Path, times_s: NDArray[np.float64], noise: MotionNoise, rng: np.random.Generator
+    path: Trajectory, times_s: NDArray[np.float64], noise: MotionNoise, rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """Return what the vehicle reports at some times: (N, 2) speed and yaw rate."""
     seen_s = times_s - noise.latency_s

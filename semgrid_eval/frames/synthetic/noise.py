@@ -76,7 +76,7 @@ class DisparityErrors:
         seen = _fattened(exact_px, noise.fattened, rng)
         error = noise.correlated_px * _smooth_field(shape, sigma, rng) + noise.slow_px * self._slow
         error += noise.white_px * rng.standard_normal(shape, np.float32)
-        noisy = seen + error * np.float32(shape[1] / FULL_WIDTH_PX)
+        noisy = np.asarray(seen + error * np.float32(shape[1] / FULL_WIDTH_PX), np.float32)
         lost = _smooth_field(shape, 0.006 * shape[1], rng) > _threshold(noise.dropout)
         lost |= rng.random(shape, np.float32) < noise.speckle
         noisy[lost | _is_occluded(seen) | (seen <= 0.0)] = 0.0
@@ -103,14 +103,12 @@ class LabelErrors:
         reach[border > _threshold(noise.bad_borders)] = noise.border_px * scale
         reach[confusion > _threshold(noise.confused)] = noise.confused_px * scale
         rows, columns = np.indices(exact.shape, np.float32)
-        columns += reach * right
-        rows += reach * down
-        return cv2.remap(exact, columns, rows, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+        places = (columns + reach * right, rows + reach * down)
+        mode = cv2.BORDER_REPLICATE
+        return np.asarray(cv2.remap(exact, *places, cv2.INTER_NEAREST, borderMode=mode), np.uint8)
 
 
-def _carried(
-    old: NDArray[np.float32] | None, fresh: NDArray[np.float32], persistence: float
-) -> NDArray[np.float32]:
+def _carried(old: NDArray[np.float32] | None, fresh: NDArray[np.float32], persistence: float) -> NDArray[np.float32]:
     """Return the next field of an autoregressive sequence whose variance stays what it is."""
     if old is None:
         return fresh
@@ -124,7 +122,7 @@ def _smooth_field(shape: tuple[int, ...], sigma: float, rng: np.random.Generator
     """
     step = max(1, round(sigma))
     coarse = rng.standard_normal((shape[0] // step + 4, shape[1] // step + 4), np.float32)
-    coarse = cv2.GaussianBlur(coarse, (0, 0), 1.0)
+    coarse = np.asarray(cv2.GaussianBlur(coarse, (0, 0), 1.0), np.float32)
     size = (coarse.shape[1] * step, coarse.shape[0] * step)
     fine = cv2.resize(coarse, size, interpolation=cv2.INTER_CUBIC)[step : step + shape[0], step : step + shape[1]]
     return np.asarray(fine / max(float(fine.std()), 1e-6), np.float32)

@@ -1,10 +1,7 @@
 """Plans the recordings of a synthetic data set: which towns, which windows, which split."""
 
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -43,8 +40,8 @@ class SyntheticConfig(Config):
     noise: Literal["modelled", "exact"] = "modelled"
     towns: Annotated[int, Field(ge=1, le=100)] = 4
     val_share: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.3
-    town_size_m: Annotated[float, Field(ge=250.0, le=2000.0)] = 600.0
-    duration_s: Annotated[float, Field(ge=10.0, le=3600.0)] = 120.0
+    town_size_m: Annotated[float, Field(ge=250.0, le=2000.0)] = 450.0
+    duration_s: Annotated[float, Field(ge=10.0, le=3600.0)] = 90.0
 
     @model_validator(mode="after")
     def _splits_need_towns(self) -> Self:
@@ -102,27 +99,16 @@ def _shares(config: SyntheticConfig) -> list[_Share]:
 
 
 def _prepare_towns(specs: list[TownSpec], cache_dir: Path, progress: Progress, workers: int) -> list[Path]:
-    folders: list[Path | None] = [None] * len(specs)
-    with _executor(min(workers, len(specs))) as executor:
-        waiting = {executor.submit(prepare_town, spec, cache_dir): index for index, spec in enumerate(specs)}
-        for done, future in enumerate(as_completed(waiting), start=1):
-            index = waiting[future]
-            folders[index] = future.result()
-            progress(done, len(specs), f"town {specs[index].index} ({specs[index].kind})")
-    return [folder for folder in folders if folder is not None]
-
-
-@contextmanager
-def _executor(workers: int) -> Iterator[Executor]:
-    """Give processes, or for a single worker a thread: SUMO is a process of its own anyway."""
-    context = get_context("spawn")
-    executor: Executor = (
-        ProcessPoolExecutor(workers, mp_context=context) if workers > 1 else ThreadPoolExecutor(max_workers=1)
-    )
-    try:
-        yield executor
-    finally:
-        executor.shutdown(cancel_futures=True)
+    """Return the towns' folders in order; threads suffice, because the long part of each is SUMO's own process."""
+    with ThreadPoolExecutor(max_workers=max(workers, 1)) as executor:
+        waiting = {executor.submit(prepare_town, spec, cache_dir): spec for spec in specs}
+        try:
+            for done, future in enumerate(as_completed(waiting), start=1):
+                future.result()
+                progress(done, len(specs), f"town {waiting[future].index} ({waiting[future].kind})")
+        finally:
+            executor.shutdown(cancel_futures=True)
+        return [future.result() for future in waiting]
 
 
 def _plans_of_town(config: SyntheticConfig, share: _Share, folder: Path, first: int) -> list[RecordingPlan]:

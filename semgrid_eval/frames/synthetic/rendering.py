@@ -12,23 +12,32 @@ from numpy.typing import NDArray
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.frames.synthetic import motion
-from semgrid_eval.frames.synthetic.bodies import boxes_of, heights_m
+from semgrid_eval.frames.synthetic.bodies import actor_ids, heights_m
 from semgrid_eval.frames.synthetic.drives import FRAME_COUNT, FRAME_RATE_HZ, Drive, ego_path
 from semgrid_eval.frames.synthetic.noise import DisparityErrors, DisparityNoise, LabelErrors, LabelNoise
 from semgrid_eval.frames.synthetic.road_users import ROAD_USERS
-from semgrid_eval.frames.synthetic.sensors import Camera, RayCaster, cityscapes_camera, look
-from semgrid_eval.frames.synthetic.shading import draw_sunlight, shade
-from semgrid_eval.frames.synthetic.solids import Soup, soup_of_boxes
-from semgrid_eval.frames.synthetic.town import Town, load_town
+from semgrid_eval.frames.synthetic.sensors import Camera, View, cityscapes_camera
+from semgrid_eval.frames.synthetic.shading import draw_sunlight
+from semgrid_eval.frames.synthetic.stage import Stage
+from semgrid_eval.frames.synthetic.town import load_town
 from semgrid_eval.frames.synthetic.traffic import Snapshot
-from semgrid_eval.frames.types import Actor, CameraFrame, MotionSample, Moment, Pose, Recording
+from semgrid_eval.frames.types import Actor, CameraFrame, Moment, MotionSample, Pose, Recording
 
 CAMERA_NAME = "front"
 RENDER_VERSION = 1
 """Counts changes to what a plan renders to; logs of another version are rendered anew."""
 STAMP_JITTER_S = 0.001
-_SIGHT_M = 150.0
-_BEHIND_M, _ASIDE_M, _WIDENING = 15.0, 40.0, 0.75  # what throws shadows into the picture is kept, too
+# Speed counts more than size here. OpenCV before 4.12 has no choice of filter and ignores it.
+_FILTER, _NO_FILTER, _FILTER_UP = 19, 8, 32
+_COLOUR_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, 0, _FILTER, _NO_FILTER]
+_GREY_PNG = [
+    cv2.IMWRITE_PNG_COMPRESSION,
+    1,
+    cv2.IMWRITE_PNG_STRATEGY,
+    cv2.IMWRITE_PNG_STRATEGY_RLE,
+    _FILTER,
+    _FILTER_UP,
+]
 
 
 @dataclass(frozen=True)
@@ -99,30 +108,41 @@ def _moments(plan: RecordingPlan) -> Iterator[Moment]:
     is_exact = plan.noise == "exact"
     reported = motion.report(path, times_s, motion.EXACT_MOTION if is_exact else motion.MotionNoise(), reports)
     camera = Camera(cityscapes_camera(plan.width_px, plan.height_px), plan.width_px, plan.height_px)
-    errors = None if is_exact else _Errors(disparities, labels)
-    stage = _Stage(town, plan.drive.actor, camera, path.at(float(times_s[0]))[:2])
-    sunlight = draw_sunlight(light)
+    errors = (
+        None if is_exact else _Errors(DisparityErrors(DisparityNoise(), disparities), LabelErrors(LabelNoise(), labels))
+    )
+    stage = Stage(town, camera, draw_sunlight(light), path.at(float(times_s[0]))[:2])
     for time_s, (speed_mps, yaw_rate_radps) in zip(times_s, reported, strict=True):
         stamp_ns = round(float(time_s) * 1e9)
-        x_m, y_m, yaw_rad, _, _ = path.at(float(time_s))
-        pose = Pose(stamp_ns, x_m, y_m, yaw_rad)
-        others = stage.others(float(time_s), pose)
-        soup = stage.soup(others, float(time_s), pose)
-        caster = RayCaster(soup.triangles_m)
-        view = look(camera, caster, soup, town.scene.ground, pose)
-        image = shade(camera, view, caster, soup, pose, sunlight)
-        exact_px = camera.disparity_px(view.depth_m)
-        frame = CameraFrame(
-            stamp_ns=stamp_ns,
-            image_png=_png(image),
-            disparity_png=_png(coded_disparity(errors.disparity.add(exact_px) if errors else exact_px)),
-            label_png=_png(errors.labels.add(view.label) if errors else view.label),
-            exact_label_png=_png(view.label),
-            exact_disparity_png=_png(coded_disparity(exact_px)),
-            instance_png=_png(view.instance),
-        )
+        pose = Pose(stamp_ns, *path.at(float(time_s))[:3])
+        others = stage.others(float(time_s), pose, plan.drive.actor)
+        view, image = stage.picture(others, float(time_s), pose)
         sample = MotionSample(stamp_ns, float(speed_mps), float(yaw_rate_radps))
-        yield Moment(stamp_ns, {CAMERA_NAME: frame}, (sample,), pose, _actors(others))
+        frame = _frame(stamp_ns, camera, view, image, errors)
+        yield Moment(stamp_ns, {CAMERA_NAME: frame}, (sample,), pose, (*_actors(others), *_actors(stage.parked)))
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """The errors of one recording's frames, which depend on those of the frames before."""
+
+    disparity: DisparityErrors
+    labels: LabelErrors
+
+
+def _frame(stamp_ns: int, camera: Camera, view: View, image: NDArray[np.uint8], errors: _Errors | None) -> CameraFrame:
+    shape = (camera.height_px, camera.width_px)
+    exact_px = camera.disparity_px(view.depth_m).reshape(shape)
+    exact_label = view.label.reshape(shape)
+    return CameraFrame(
+        stamp_ns=stamp_ns,
+        image_png=_png(image, _COLOUR_PNG),
+        disparity_png=_png(coded_disparity(errors.disparity.add(exact_px) if errors else exact_px), _GREY_PNG),
+        label_png=_png(errors.labels.add(exact_label) if errors else exact_label, _GREY_PNG),
+        exact_label_png=_png(exact_label, _GREY_PNG),
+        exact_disparity_png=_png(coded_disparity(exact_px), _GREY_PNG),
+        instance_png=_png(view.instance.reshape(shape), _GREY_PNG),
+    )
 
 
 def coded_disparity(disparity_px: NDArray[np.float32]) -> NDArray[np.uint16]:
@@ -131,76 +151,20 @@ def coded_disparity(disparity_px: NDArray[np.float32]) -> NDArray[np.uint16]:
     return np.where((disparity_px > 0.0) & (coded <= 65535.0), coded, 0.0).astype(np.uint16)
 
 
-class _Errors:
-    """The errors of one recording's frames, which depend on those of the frames before."""
-
-    def __init__(self, disparities: np.random.Generator, labels: np.random.Generator) -> None:
-        self.disparity = DisparityErrors(DisparityNoise(), disparities)
-        self.labels = LabelErrors(LabelNoise(), labels)
-
-
-class _Stage:
-    """The part of a town that one recording can see, and who is on it."""
-
-    def __init__(self, town: Town, ego: int, camera: Camera, place_m: tuple[float, float]) -> None:
-        corners = town.scene.soup.triangles_m[:, 0, :2]
-        near = np.linalg.norm(corners - np.array(place_m, np.float32), axis=1) < _SIGHT_M
-        self._still = town.scene.soup.where(near)
-        self._parked = town.scene.parked.where(_is_near(town.scene.parked, *place_m))
-        self._traffic = town.traffic
-        self._ego = ego
-        self._camera = camera
-
-    def others(self, time_s: float, pose: Pose) -> tuple[Snapshot, Snapshot]:
-        """Return who is near: road users and parked cars."""
-        moving = self._traffic.at(time_s)
-        near = _is_near(moving, pose.x_m, pose.y_m) & (moving.actor != self._ego)
-        return moving.where(near), self._parked
-
-    def soup(self, others: tuple[Snapshot, Snapshot], time_s: float, pose: Pose) -> Soup:
-        """Return all triangles in the vehicle frame that may be seen or throw a shadow that is seen."""
-        moving = others[0]
-        movers = soup_of_boxes(boxes_of(moving, _actor_ids(moving).astype(np.uint16), time_s))
-        soup = Soup.joined([self._still, movers]).seen_from(pose.x_m, pose.y_m, pose.yaw_rad)
-        ahead_m, left_m = soup.triangles_m[..., 0].max(axis=1), np.abs(soup.triangles_m[..., 1]).min(axis=1)
-        return soup.where((ahead_m > -_BEHIND_M) & (left_m < _ASIDE_M + _WIDENING * np.maximum(ahead_m, 0.0)))
-
-
-def _is_near(actors: Snapshot, x_m: float, y_m: float) -> NDArray[np.bool_]:
-    return np.asarray(np.linalg.norm(actors.centre_m - (x_m, y_m), axis=1) < _SIGHT_M)
-
-
-def _actor_ids(actors: Snapshot) -> NDArray[np.int32]:
-    """Return the ids (A,) of actors; 0 means no actor, so they begin at 1."""
-    return actors.actor + 1
-
-
-def _actors(groups: tuple[Snapshot, Snapshot]) -> tuple[Actor, ...]:
+def _actors(group: Snapshot) -> list[Actor]:
+    columns = np.column_stack(
+        [group.centre_m, group.yaw_rad, heights_m(group.actor, group.type_index), group.velocity_mps]
+    )
     found = []
-    for group in groups:
-        heights = heights_m(group.actor, group.type_index)
-        for index, actor_id in enumerate(_actor_ids(group)):
-            user = ROAD_USERS[group.type_index[index]]
-            x_m, y_m = group.centre_m[index]
-            velocity_x, velocity_y = group.velocity_mps[index]
-            found.append(
-                Actor(
-                    actor_id=int(actor_id),
-                    label_id=user.label_id,
-                    x_m=float(x_m),
-                    y_m=float(y_m),
-                    yaw_rad=float(group.yaw_rad[index]),
-                    length_m=user.length_m,
-                    width_m=user.width_m,
-                    height_m=float(heights[index]),
-                    velocity_x_mps=float(velocity_x),
-                    velocity_y_mps=float(velocity_y),
-                )
-            )
-    return tuple(found)
+    for actor_id, type_index, values in zip(actor_ids(group).tolist(), group.type_index, columns.tolist(), strict=True):
+        user = ROAD_USERS[type_index]
+        x_m, y_m, yaw_rad, height_m, velocity_x, velocity_y = values
+        size_m = (user.length_m, user.width_m, height_m)
+        found.append(Actor(actor_id, user.label_id, x_m, y_m, yaw_rad, *size_m, velocity_x, velocity_y))
+    return found
 
 
-def _png(image: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
-    done, data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+def _png(image: NDArray[np.uint8] | NDArray[np.uint16], parameters: list[int]) -> bytes:
+    done, data = cv2.imencode(".png", image, parameters)
     assert done, "OpenCV encodes every 8 or 16 bit image"
     return data.tobytes()

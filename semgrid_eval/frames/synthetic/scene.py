@@ -38,7 +38,12 @@ class Scene:
         """Write the scene's arrays."""
         self.ground.save(folder)
         self.soup.save(folder)
-        np.savez(folder / "parked.npz", type_index=self.parked.type_index, centre=self.parked.centre_m, yaw=self.parked.yaw_rad)
+        np.savez(
+            folder / "parked.npz",
+            type_index=self.parked.type_index,
+            centre=self.parked.centre_m,
+            yaw=self.parked.yaw_rad,
+        )
 
     @classmethod
     def load(cls, folder: Path) -> "Scene":
@@ -58,8 +63,7 @@ def build_scene(network: Network, kind: TownKind, rng: np.random.Generator) -> S
     parked = _standing(np.array([car[0] for car in cars], np.uint8), places[:, :2], places[:, 2])
     furniture, trees = furnish_streets(network, kind, rng)
     frontage = line_streets(network, kind, Plots(ground), rng)
-    instance = (FIRST_PARKED_ID + np.arange(len(parked))).astype(np.uint16)
-    boxes = np.concatenate([np.array(furniture + frontage.boxes, BOX), boxes_of(parked, instance, 0.0)])
+    boxes = np.concatenate([np.array(furniture + frontage.boxes, BOX), boxes_of(parked, 0.0)])
     return Scene(ground, Soup.joined([soup_of_boxes(boxes), soup_of_trees(trees + frontage.trees, rng)]), parked)
 
 

@@ -1,6 +1,7 @@
 """A simulated camera: pinhole rays cast with Embree at the town's triangles and an analytic ground plane."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -49,17 +50,19 @@ def ego_from_camera_rotation(calibration: CameraCalibration) -> NDArray[np.float
 
 @dataclass(frozen=True)
 class View:
-    """What a camera sees; all arrays are (H, W).
+    """What a camera sees, one row a pixel, row by row (N = H * W).
 
     Args:
-        depth_m: along the optical axis, infinite for the sky.
-        label: Cityscapes label id.
-        instance: actor id, 0 where there is none.
-        surface: of the ground, where there is ground.
-        triangle: index of the triangle that is seen, `NO_TRIANGLE` where it is ground or sky.
+        depth_m: (N,) along the optical axis, infinite for the sky.
+        points_m: (N, 3) what is seen, in the frame of the stage; of the sky, something far away.
+        label: (N,) Cityscapes label id.
+        instance: (N,) actor id, 0 where there is none.
+        surface: (N,) of the ground, where there is ground.
+        triangle: (N,) index of the triangle that is seen, `NO_TRIANGLE` where it is ground or sky.
     """
 
     depth_m: NDArray[np.float32]
+    points_m: NDArray[np.float32]
     label: NDArray[np.uint8]
     instance: NDArray[np.uint16]
     surface: NDArray[np.uint8]
@@ -68,7 +71,7 @@ class View:
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera on a vehicle."""
+    """A pinhole camera on a vehicle; pixels are numbered row by row (N = H * W)."""
 
     calibration: CameraCalibration
     width_px: int
@@ -76,7 +79,7 @@ class Camera:
 
     @cached_property
     def rays_ego(self) -> NDArray[np.float32]:
-        """Rays (H * W, 3) in the vehicle frame; their part along the optical axis is 1, so a ray's length is depth."""
+        """Rays (N, 3) in the vehicle frame; their part along the optical axis is 1, so a ray's length is depth."""
         c = self.calibration
         right = (np.arange(self.width_px) - c.u0_px) / c.fx_px
         down = (np.arange(self.height_px) - c.v0_px) / c.fy_px
@@ -84,20 +87,16 @@ class Camera:
         return (rays @ ego_from_camera_rotation(c).T).astype(np.float32)
 
     @cached_property
-    def origin_ego_m(self) -> NDArray[np.float32]:
+    def origin_ego_m(self) -> NDArray[np.float64]:
         """The optical centre (3,) in the vehicle frame."""
-        return np.array([self.calibration.x_m, self.calibration.y_m, self.calibration.z_m], np.float32)
+        return np.array([self.calibration.x_m, self.calibration.y_m, self.calibration.z_m])
 
     @cached_property
     def ground_depth_m(self) -> NDArray[np.float32]:
-        """Depth (H * W,) at which each ray meets the ground plane, infinite where it does not."""
+        """Depth (N,) at which each ray meets the ground plane, infinite where it does not."""
         fall = -self.rays_ego[:, 2]
         with np.errstate(divide="ignore"):
             return np.where(fall > 0.0, self.origin_ego_m[2] / fall, np.inf).astype(np.float32)
-
-    def points_ego(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the points (H * W, 3) in the vehicle frame at depths (H, W) or (H * W,)."""
-        return self.origin_ego_m + depth_m.reshape(-1, 1) * self.rays_ego
 
     def disparity_px(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the disparity of depths; that of the sky is 0."""
@@ -108,7 +107,7 @@ class RayCaster:
     """Triangles that rays can be cast at."""
 
     def __init__(self, triangles_m: NDArray[np.float32]) -> None:
-        """Build Embree's tree over triangles (F, 3, 3), at least one.
+        """Build Embree's tree over triangles (F, 3, 3).
 
         Raises:
             MissingExtraError: Embree is not installed.
@@ -118,8 +117,10 @@ class RayCaster:
             from embreex.rtcore_scene import EmbreeScene
         except ImportError:
             raise MissingExtraError("synthetic", "embreex") from None
+        self.count = len(triangles_m)
         self._scene = EmbreeScene()
-        self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(triangles_m))
+        if self.count:
+            TriangleMesh(self._scene, np.ascontiguousarray(triangles_m))
 
     def cast(
         self, origins_m: NDArray[np.float32], rays: NDArray[np.float32], limit: NDArray[np.float32]
@@ -127,42 +128,68 @@ class RayCaster:
         """Return how far (N,) each ray gets, in its own lengths, and the triangle (N,) that stops it.
 
         Args:
-            origins_m: (N, 3) or (3,).
+            origins_m: (N, 3).
             rays: (N, 3).
             limit: (N,) beyond which nothing is seen.
         """
-        origins = np.ascontiguousarray(np.broadcast_to(origins_m, rays.shape))
-        found = self._scene.run(origins, rays, dists=limit, query="INTERSECT", output=True)
+        if not self.count:
+            return limit, np.full(len(rays), NO_TRIANGLE, np.int32)
+        found = self._scene.run(origins_m, rays, dists=limit, query="INTERSECT", output=True)
         return found["tfar"], found["primID"]
 
 
-def look(camera: Camera, caster: RayCaster, soup: Soup, ground: Ground, pose: Pose) -> View:
+def cast_at_all(
+    casters: Sequence[RayCaster],
+    origins_m: NDArray[np.float32],
+    rays: NDArray[np.float32],
+    limit: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Cast rays at several sets of triangles, numbered one set after the other; see `RayCaster.cast`."""
+    reached, triangle, first = limit, np.full(len(rays), NO_TRIANGLE, np.int32), 0
+    for caster in casters:
+        reached, hit = caster.cast(origins_m, rays, reached)
+        triangle = np.where(hit == NO_TRIANGLE, triangle, hit + first)
+        first += caster.count
+    return reached, triangle
+
+
+def look(
+    camera: Camera,
+    pose: Pose,
+    casters: Sequence[RayCaster],
+    soup: Soup,
+    ground: Ground,
+    stage_m: tuple[float, float] = (0.0, 0.0),
+) -> View:
     """Cast one ray a pixel.
 
     Args:
         camera: on the vehicle.
-        caster: holds the soup's triangles in the vehicle frame.
+        pose: of the vehicle in the map frame.
+        casters: hold the soup's triangles in the frame of the stage.
         soup: labels and instances of the triangles.
         ground: in the map frame.
-        pose: of the vehicle.
+        stage_m: x, y of the stage's origin in the map frame, near the vehicle, where single precision is exact enough.
     """
-    limit_m = np.minimum(camera.ground_depth_m, MAX_DEPTH_M)
-    depth_m, triangle = caster.cast(camera.origin_ego_m, camera.rays_ego, limit_m)
-    surface = _ground_seen(camera, ground, pose)
-    is_ground = (triangle == NO_TRIANGLE) & (camera.ground_depth_m < np.inf)
-    is_sky = (triangle == NO_TRIANGLE) & ~is_ground
-    depth = np.where(is_ground, camera.ground_depth_m, np.where(is_sky, np.float32(np.inf), depth_m))
-    label = np.where(is_sky, np.uint8(_SKY), np.where(is_ground, SURFACE_LABELS[surface], soup.label[triangle]))
-    instance = np.where(triangle == NO_TRIANGLE, np.uint16(0), soup.instance[triangle])
-    shape = (camera.height_px, camera.width_px)
-    return View(*(part.reshape(shape) for part in (depth, label, instance, surface, triangle)))
-
-
-def _ground_seen(camera: Camera, ground: Ground, pose: Pose) -> NDArray[np.uint8]:
-    """Return the surface (H * W,) where each ray meets the ground plane, whether something hides it or not."""
-    depth_m = np.minimum(camera.ground_depth_m, MAX_DEPTH_M)
-    points = camera.points_ego(depth_m)
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-    x_m = pose.x_m + cos * points[:, 0] - sin * points[:, 1]
-    y_m = pose.y_m + sin * points[:, 0] + cos * points[:, 1]
-    return ground.at(x_m, y_m)
+    stage_from_ego = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    rays = camera.rays_ego @ stage_from_ego.T.astype(np.float32)
+    offset_m = (pose.x_m - stage_m[0], pose.y_m - stage_m[1], 0.0)
+    origin_m = (stage_from_ego @ camera.origin_ego_m + offset_m).astype(np.float32)
+    origins_m = np.ascontiguousarray(np.broadcast_to(origin_m, rays.shape))
+    reached_m, triangle = cast_at_all(casters, origins_m, rays, np.minimum(camera.ground_depth_m, MAX_DEPTH_M))
+    is_open = triangle == NO_TRIANGLE
+    points_m = rays * reached_m[:, None]
+    points_m += origin_m
+    surface = ground.at(points_m[:, 0] + np.float32(stage_m[0]), points_m[:, 1] + np.float32(stage_m[1]))
+    behind = np.where(np.isinf(camera.ground_depth_m), np.uint8(_SKY), SURFACE_LABELS[surface])
+    return View(
+        depth_m=np.where(is_open, camera.ground_depth_m, reached_m),
+        points_m=points_m,
+        label=np.where(is_open, behind, soup.label[triangle]) if len(soup) else behind,
+        instance=np.where(is_open, np.uint16(0), soup.instance[triangle])
+        if len(soup)
+        else np.zeros_like(behind, np.uint16),
+        surface=surface,
+        triangle=triangle,
+    )

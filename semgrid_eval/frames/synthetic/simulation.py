@@ -79,8 +79,8 @@ def _write_types(path: Path) -> None:
             if user.sumo_class == sumo_class:
                 size = {"length": str(user.length_m), "width": str(user.width_m), "height": str(user.height_m)}
                 size = {} if sumo_class == "pedestrian" else size  # SUMO's own size steers how people evade each other
-                share = str(user.share)
-                ET.SubElement(group, "vType", id=user.name, vClass=sumo_class, probability=share, **size)
+                kind = {"id": user.name, "vClass": sumo_class, "probability": str(user.share)}
+                ET.SubElement(group, "vType", {**kind, **size})
     ET.ElementTree(root).write(path)
 
 
@@ -116,14 +116,16 @@ def _write_trips(network: Path, stream: _Stream, end_s: float, seed: int) -> Non
 
 def _read_trajectories(path: Path) -> Traffic:
     try:
-        table = pd.read_csv(path, sep=";", usecols=_FIELDS, dtype={"vehicle_id": "category", "vehicle_type": "category"})
+        table = pd.read_csv(
+            path, sep=";", usecols=_FIELDS, dtype={"vehicle_id": "category", "vehicle_type": "category"}
+        )
     except (OSError, ValueError) as error:
         raise InputError(f"SUMO's trajectories cannot be read ({error}); SUMO 1.28 writes them", path=path) from error
     table = table.dropna()
     if table.empty:
         raise InputError("the town is empty: nobody moved", path=path)
     steps, offsets = np.unique(table["timestep_time"].to_numpy(), return_index=True)
-    actor = table["vehicle_id"].cat.codes.to_numpy(np.int32)
+    actor = table["vehicle_id"].cat.codes.to_numpy().astype(np.int32)
     type_of_code = np.array([type_index(name) for name in table["vehicle_type"].cat.categories], np.uint8)
     actor_types = np.zeros(int(actor.max()) + 1, np.uint8)
     actor_types[actor] = type_of_code[table["vehicle_type"].cat.codes.to_numpy()]

@@ -43,8 +43,20 @@ BoxRow = tuple[
 
 # Corners: bit 0 front, bit 1 left, bit 2 top. Faces turn counter-clockwise seen from outside.
 _BOX_FACES = np.array(
-    [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3), (1, 3, 7), (1, 7, 5)]
-    + [(0, 4, 6), (0, 6, 2)]
+    [
+        (0, 2, 3),
+        (0, 3, 1),
+        (4, 5, 7),
+        (4, 7, 6),
+        (0, 1, 5),
+        (0, 5, 4),
+        (2, 6, 7),
+        (2, 7, 3),
+        (1, 3, 7),
+        (1, 7, 5),
+        (0, 4, 6),
+        (0, 6, 2),
+    ]
 )
 
 
@@ -88,12 +100,10 @@ class Soup:
         """Return the triangles for which `keep` (F,) holds."""
         return Soup(*(getattr(self, entry.name)[keep] for entry in fields(self)))
 
-    def seen_from(self, x_m: float, y_m: float, yaw_rad: float) -> "Soup":
-        """Return the soup in the frame of a vehicle at a place of the map (in double precision until it is near)."""
-        cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
-        vehicle_from_map = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        moved = (self.triangles_m.astype(np.float64) - (x_m, y_m, 0.0)) @ vehicle_from_map.T
-        return replace(self, triangles_m=moved.astype(np.float32))
+    def moved(self, x_m: float, y_m: float) -> "Soup":
+        """Return the soup moved by x, y, computed in double precision."""
+        offset_m = np.array([x_m, y_m, 0.0])
+        return replace(self, triangles_m=(self.triangles_m.astype(np.float64) + offset_m).astype(np.float32))
 
     @staticmethod
     def joined(parts: list["Soup"]) -> "Soup":
@@ -129,7 +139,9 @@ def soup_of_boxes(boxes: NDArray[np.void]) -> Soup:
         axis=-1,
     )
     triangles = corners[:, _BOX_FACES].reshape(-1, 3, 3).astype(np.float32)
-    attributes = (np.repeat(boxes[name], len(_BOX_FACES), axis=0) for name in ("label", "texture", "instance", "colour"))
+    attributes = (
+        np.repeat(boxes[name], len(_BOX_FACES), axis=0) for name in ("label", "texture", "instance", "colour")
+    )
     return Soup(triangles, *attributes)
 
 
@@ -171,7 +183,11 @@ def _icosphere() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     distances = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = distances < 2.1
     faces = [
-        (a, b, c) for a in range(12) for b in range(a + 1, 12) for c in range(b + 1, 12) if near[a, b] & near[b, c] & near[a, c]
+        (a, b, c)
+        for a in range(12)
+        for b in range(a + 1, 12)
+        for c in range(b + 1, 12)
+        if near[a, b] & near[b, c] & near[a, c]
     ]
     corners_of = [tuple(face) if _is_outward(points, face) else (face[0], face[2], face[1]) for face in faces]
     places = list(points)

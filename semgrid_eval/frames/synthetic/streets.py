@@ -72,7 +72,7 @@ def _write_nodes(
     for name, (x_m, y_m) in positions.items():
         control = "traffic_light" if rng.random() < kind.traffic_lights else "priority"
         place = {"x": f"{x_m:.2f}", "y": f"{y_m:.2f}"}
-        ET.SubElement(root, "node", id=name, type=control, radius=str(JUNCTION_RADIUS_M), **place)
+        ET.SubElement(root, "node", {"id": name, "type": control, "radius": str(JUNCTION_RADIUS_M), **place})
     ET.ElementTree(root).write(path)
 
 
@@ -113,12 +113,10 @@ def _bent_line(start: NDArray[np.float64], end: NDArray[np.float64], bend_m: flo
     along = np.linspace(0.0, 1.0, _BEND_POINTS if bend_m else 2)[:, None]
     direction = (end - start) / np.linalg.norm(end - start)
     left = np.array([-direction[1], direction[0]])
-    return start + along * (end - start) + 4.0 * along * (1.0 - along) * bend_m * left
+    return np.asarray(start + along * (end - start) + 4.0 * along * (1.0 - along) * bend_m * left)
 
 
-def _add_edge(
-    root: ET.Element, name: str, ends: tuple[str, str], street: _Street, line: NDArray[np.float64]
-) -> None:
+def _add_edge(root: ET.Element, name: str, ends: tuple[str, str], street: _Street, line: NDArray[np.float64]) -> None:
     lanes: list[dict[str, str]] = [{"allow": "pedestrian", "width": str(SIDEWALK_WIDTH_M)}]
     if street.has_parking:
         lanes.append({"disallow": "all", "width": str(PARKING_WIDTH_M)})
@@ -127,6 +125,6 @@ def _add_edge(
     lanes += [{"disallow": "pedestrian", "width": str(CAR_LANE_WIDTH_M)}] * street.lane_count
     shape = " ".join(f"{x_m:.2f},{y_m:.2f}" for x_m, y_m in line)
     extent = {"from": ends[0], "to": ends[1], "shape": shape, "numLanes": str(len(lanes))}
-    edge = ET.SubElement(root, "edge", id=name, speed=str(SPEED_LIMIT_MPS), priority="5", **extent)
+    edge = ET.SubElement(root, "edge", {"id": name, "speed": str(SPEED_LIMIT_MPS), "priority": "5", **extent})
     for index, lane in enumerate(lanes):
-        ET.SubElement(edge, "lane", index=str(index), **lane)
+        ET.SubElement(edge, "lane", {"index": str(index), **lane})

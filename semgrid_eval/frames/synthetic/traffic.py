@@ -90,7 +90,9 @@ class Traffic:
         moved[jumped] = 0.0
         yaw = self.heading_rad[rows].astype(np.float64)
         turn = _wrapped(self.heading_rad[next_rows].astype(np.float64) - yaw)
-        return Snapshot(actor, np.asarray(self.actor_types[actor]), start + share * moved, yaw + share * turn, moved / span_s)
+        return Snapshot(
+            actor, np.asarray(self.actor_types[actor]), start + share * moved, yaw + share * turn, moved / span_s
+        )
 
     def track(self, actor: int, first_step: int, end_step: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return one actor's front positions (S, 2) and headings (S,) over steps; NaN where it is not there."""
@@ -112,7 +114,7 @@ class Traffic:
         back_m = np.where(_IS_PERSON[types], 0.0, 0.5 * _LENGTHS_M[types])
         yaw = self.heading_rad[rows].astype(np.float64)
         ahead = np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
-        return self.position_m[rows].astype(np.float64) - back_m[:, None] * ahead
+        return np.asarray(self.position_m[rows].astype(np.float64) - back_m[:, None] * ahead)
 
 
 def _wrapped(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
