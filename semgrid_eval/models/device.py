@@ -41,8 +41,8 @@ def choose_device(name: str = "auto") -> torch.device:
 def choose_precision(name: Precision, device: torch.device) -> torch.dtype:
     """Turn `auto` into bfloat16 where the device multiplies in it natively, else float32.
 
-    On an AMD EPYC with avx512_bf16 training in bfloat16 is 1.7 to 2 times as fast as in float32
-    (`tools/bench_training.py`); on a CPU without such instructions it is slower.
+    On two cores of an AMD EPYC with avx512_bf16, training in bfloat16 is 1.5 (f 16) to 1.9 times (f 64) as fast as in
+    float32 (`tools/bench_training.py`). A CPU without such instructions emulates them.
     """
     native = torch.cuda.is_bf16_supported() if device.type == "cuda" else device.type == "cpu" and cpu_has_bf16()
     return torch.bfloat16 if name == "bf16" or (name == "auto" and native) else torch.float32
