@@ -17,7 +17,7 @@ class Headline:
     """The best row of the main group and the rows it is measured against."""
 
     best: Row
-    rival: Row | None  # the best row of the other kind: a baseline if the best is trained, else a trained row
+    rival: Row | None  # the best row of the other kind (baseline or not), else the runner-up
     reference: Row | None  # the baseline of the best row's own experiment
 
 
@@ -44,6 +44,7 @@ def headline(scores: Mapping[str, RowScores]) -> Headline | None:
     group = _main_group(rows)
     best = max(group, key=lambda row: scores[row.name].mean[HEADLINE])
     others = [row for row in group if row.is_baseline != best.is_baseline]
+    others = others or [row for row in group if row != best]
     rival = max(others, key=lambda row: scores[row.name].mean[HEADLINE], default=None)
     return Headline(best, rival, reference_of(best, rows))
 

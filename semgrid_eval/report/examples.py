@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
-from semgrid_eval.report.cells import signed
 from semgrid_eval.report.comparison import Headline, reference_of
 from semgrid_eval.report.reading import Result, Row
 from semgrid_eval.scores.iou import class_iou
@@ -51,9 +50,6 @@ class Pick:
     reason: str
     score: float
 
-    def __str__(self) -> str:
-        return f"{self.reason}: {signed(self.score)}"
-
 
 def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
     """Choose who is measured against whom: ED-DC against BL-DC and BL-NT where they exist, then the other trained rows.
@@ -62,8 +58,8 @@ def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
     """
     if headline is None:
         return []
-    main = _row(rows, headline.best, "ED", "DC") or (headline.rival if headline.best.is_baseline else headline.best)
-    main = main or headline.best
+    trained = (row for row in (headline.best, headline.rival) if row is not None and not row.is_baseline)
+    main = _row(rows, headline.best, "ED", "DC") or next(trained, headline.best)
     named = [_row(rows, main, "BL", "DC"), _row(rows, main, "BL", "NT")]
     rivals = [row for row in named if row is not None and row != main] or _default_rivals(main, rows, headline)
     others = [(row, reference_of(row, rows)) for row in rows if not row.is_baseline and row != main]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import SemgridError
+from semgrid_eval.report.cells import number, signed
 from semgrid_eval.report.examples import Contest, Pick, key_of, positions
 from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, certainty_png, data_uri, grid_png, right_png
 from semgrid_eval.report.reading import Result
@@ -70,9 +71,15 @@ def _draw(contest: Contest, picks: Sequence[Pick]) -> Iterator[Example]:
         grids = {name: array[i] for name, array in (shown | mine).items()}
         theirs = {name: grid for name, grids_of in rivals.items() if (grid := grids_of[i]) is not None}
         pictures = tuple(_pictures(contest, grids, theirs))
-        time = shown_time(window.target_stamp_ns)
+        score = signed(pick.score) if contest.rivals else number(pick.score)
         yield Example(
-            str(pick), window.recording, window.log, window.target_frame, time, pictures, _legend(grids, theirs)
+            title=f"{pick.reason}: {score}",
+            recording=window.recording,
+            log=window.log,
+            frame=window.target_frame,
+            time=shown_time(window.target_stamp_ns),
+            pictures=pictures,
+            legend=_legend(grids, theirs),
         )
 
 
@@ -94,6 +101,8 @@ def _pictures(contest: Contest, grids: dict[str, NDArray[np.generic]], rivals: d
         alt = f"Cells where {name} or {rival} is right"
         yield Picture("Who is right", alt, data_uri(right_png(target, prediction, grid, mask)))
     certainty = np.asarray(grids["certainty"], np.uint8)
+    if certainty.min() == certainty.max():
+        return  # a baseline is equally certain of everything
     yield Picture("Certainty", f"Certainty of {name}, light is certain", data_uri(certainty_png(certainty)))
 
 

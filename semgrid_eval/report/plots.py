@@ -77,7 +77,7 @@ def _category_plot(scores: Scores, categories: Sequence[str], name: str) -> Plot
             _bars(axes, scores, category, experiments, models)
         panels[0].legend(fontsize=8, ncols=len(models), loc="lower left", bbox_to_anchor=(0, 1.08), borderaxespad=0)
         words = ", ".join(LABELS[category].lower() for category in categories)
-        caption = f"IoU of {words} by experiment; lines on the bars are 95 % intervals."
+        caption = f"IoU of {words} by experiment; lines on the bars are 95% intervals."
         return finish(figure, name, "categories.csv", caption)
 
 

@@ -10,6 +10,7 @@ from semgrid_eval.report.reading import Row, Run
 from semgrid_eval.report.tables import LABELS
 
 Scores = Mapping[str, RowScores]
+_FEW_RECORDINGS = 10
 _WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
 
 
@@ -49,11 +50,11 @@ def _which(scores: Scores, found: Headline | None) -> str:
     best = scores[found.best.name]
     start = f"{found.best.name} predicts best: mean class IoU {number(best.mean[HEADLINE])} without unknown"
     if found.rival is None:
-        return f"{start} ({interval_phrase(best.estimate(HEADLINE))}); there is no other kind of model to compare with."
+        return f"{start} ({interval_phrase(best.estimate(HEADLINE))}); there is no other row to compare with."
     lead = best.minus(scores[found.rival.name], HEADLINE)
-    kind = "trained model" if found.best.is_baseline else "baseline"
+    kind = _kind(found.best, found.rival)
     phrase = interval_phrase(lead, with_sign=True)
-    return f"{start}, {signed(lead.value)} over {found.rival.name}, the best {kind} ({phrase})."
+    return f"{start}, {signed(lead.value)} over {found.rival.name}, {kind} ({phrase})."
 
 
 def _against_reference(scores: Scores, found: Headline | None) -> str:
@@ -87,6 +88,8 @@ def _evidence(runs: Sequence[Run], scores: Scores) -> str:
 def _doubt(recordings: int, seeds: Sequence[int]) -> str:
     if recordings < 2:
         return " With fewer than two recordings there are no intervals."
+    if recordings < _FEW_RECORDINGS:
+        return " With so few recordings the intervals are rough."
     if seeds and min(seeds) == 1:
         return " Intervals of rows with one seed leave out the chance in training."
     return ""
@@ -116,12 +119,18 @@ def _tile(label: str, difference: Estimate, reach: float) -> Tile:
 
 
 def _pair(found: Headline | None) -> tuple[Row | None, Row | None]:
-    """Choose the trained row and the baseline that the head of the page compares."""
+    """Choose the two rows that the head of the page compares, a baseline as the second."""
     if found is None:
         return None, None
-    if found.best.is_baseline:
-        return found.rival, found.best if found.rival is not None else None
-    return found.best, found.reference
+    if found.rival is not None and found.best.is_baseline and not found.rival.is_baseline:
+        return found.rival, found.best
+    return found.best, found.reference or found.rival
+
+
+def _kind(best: Row, rival: Row) -> str:
+    if best.is_baseline == rival.is_baseline:
+        return "the runner-up"
+    return "the best baseline" if rival.is_baseline else "the best model that is no baseline"
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -29,16 +29,16 @@ Scores = Mapping[str, RowScores]
 _PAPER = "The paper's values (Table A1) come from Cityscapes' validation set."
 LABELS = {
     "static": "Static",
-    "static_known": "Static, known",
+    "static_known": "Static (known)",
     "small_static": "Small static",
     "vehicles": "Vehicles",
     "small_dynamic": "Small dynamic",
-    "mean_known": "Mean, known",
+    "mean_known": "Mean (known)",
     **{name: name.replace("_", " ") for name in CLASS_NAMES},
-    "merged_static": "Static, merged",
-    "merged_small_static": "Small static, merged",
-    "merged_vehicles": "Vehicles, merged",
-    "merged_small_dynamic": "Small dynamic, merged",
+    "merged_static": "Static (merged)",
+    "merged_small_static": "Small static (merged)",
+    "merged_vehicles": "Vehicles (merged)",
+    "merged_small_dynamic": "Small dynamic (merged)",
 }
 
 
@@ -51,7 +51,7 @@ def value_table(name: str, caption: str, scores: Scores, columns: Sequence[str])
 
 def category_values(scores: Scores) -> Table:
     """Show the categories as the paper counts them."""
-    caption = "Category scores: mean of the class IoUs, with 95 % interval. Best of each column in bold. " + _PAPER
+    caption = "Category scores: mean of the class IoUs, with 95% interval. Best of each column in bold. " + _PAPER
     return value_table("categories", caption, scores, CATEGORY_COLUMNS)
 
 
@@ -74,13 +74,14 @@ def difference_table(name: str, scores: Scores, columns: Sequence[str]) -> Table
             for c, d in differences.items()
         ]
         bodies.append((Line(f"{entry.row.name} \N{MINUS SIGN} {reference.name}", tuple(cells)),))
-    caption = "Differences to the baseline, resampled together. Marked where the interval excludes zero."
+    kind = "by class" if set(columns) <= set(CLASS_NAMES) else "by category"
+    caption = f"Differences to the baseline {kind}, resampled together. Marked where the interval excludes zero."
     return Table(name, caption, "Rows", _headers(scores, columns), tuple(bodies)) if bodies else None
 
 
 def class_values(scores: Scores) -> Table:
     """Show the classes of every row beside the paper's values and the difference to them."""
-    return value_table("classes", f"Class IoU with 95 % interval. {_PAPER}", scores, CLASS_NAMES)
+    return value_table("classes", f"Class IoU with 95% interval. {_PAPER}", scores, CLASS_NAMES)
 
 
 def run_differences(scores: Scores, tags: Sequence[str], columns: Sequence[str]) -> Table | None:

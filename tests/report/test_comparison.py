@@ -76,5 +76,5 @@ def test_the_summary_says_who_leads_by_how_much_and_on_what_it_rests(run):
     assert f"+{lead:.3f} over BL-Fuse" in summary.sentences[0]
     assert "16 windows from 8 recordings" in summary.sentences[2]
     assert "1 row failed" in summary.sentences[2]
-    assert [tile.label for tile in summary.tiles][-1] == "Mean, known"
+    assert [tile.label for tile in summary.tiles][-1] == "Mean (known)"
     assert all(0 <= tile.low <= tile.at <= tile.high <= 100 for tile in summary.tiles)

@@ -93,7 +93,7 @@ def test_the_papers_contest_comes_first_and_others_follow(run):
     ("rows", "model", "rivals"),
     [
         ((FakeRow("DC", "BL"),), "BL-DC", []),
-        ((FakeRow("DC", "BL"), FakeRow("NT", "BL", translate=False)), "BL-DC", ["BL-NT"]),
+        ((FakeRow("DC", "BL"), FakeRow("Fuse", "BL")), "BL-Fuse", ["BL-DC"]),
         ((FakeRow("Sp2", "ED", 0.1, 1), FakeRow("Sp2", "BL")), "ED-Sp2", ["BL-Sp2"]),
     ],
 )

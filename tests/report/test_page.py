@@ -149,7 +149,7 @@ def test_one_row_only_in_the_default_place_where_an_old_report_is_replaced(tmp_p
     assert not (old / "old.txt").exists()
     text = _read(page).text
     assert "BL-DC predicts best" in text
-    assert "no other kind of model to compare with" in text
+    assert "no other row to compare with" in text
     assert "No row was trained" in text
 
 
