@@ -65,7 +65,18 @@ def _compiler_environment(folder: Path) -> dict[str, str]:
     except importlib.metadata.PackageNotFoundError:
         pass
     requirement = f"{COMPILER}=={COMPILER_VERSION}"
-    install = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(folder), requirement]
+    install = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--retries=0",
+        "--no-deps",
+        "--target",
+        str(folder),
+        requirement,
+    ]
     subprocess.run(install, check=True)
     return {**os.environ, "PYTHONPATH": str(folder)}
 

@@ -1,6 +1,5 @@
 """Write a recording as an MCAP log, find logs, and read them back moment by moment."""
 
-import json
 import math
 from collections.abc import Callable, Iterator
 from itertools import groupby
@@ -10,7 +9,7 @@ from typing import Self, TypeVar
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
-from semgrid_eval.classes import CITYSCAPES_LABELS, label_palette
+from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.files import atomic_file
 from semgrid_eval.frames.png import read_header, with_palette
@@ -24,20 +23,6 @@ from semgrid_eval.log.writer import MessageWriter
 
 SUFFIX = ".mcap"
 T = TypeVar("T")
-
-_DISPARITY_NOTES = {"coding": "d_px = (p - 1) / 256; p = 0 is invalid", "unit": "px"}
-_LABEL_NOTES = {"coding": "Cityscapes label ids", "names": json.dumps({e.label_id: e.name for e in CITYSCAPES_LABELS})}
-_INSTANCE_NOTES = {"coding": "actor id of each pixel; 0 is no actor"}
-# Channel of a camera by field of CameraFrame, in the order of writing: the colour image, which scoring never reads,
-# comes last and alone in its chunk.
-_CHANNELS = {
-    "disparity_png": (topics.DISPARITY, _DISPARITY_NOTES),
-    "label_png": (topics.LABEL, _LABEL_NOTES),
-    "exact_disparity_png": (topics.EXACT_DISPARITY, _DISPARITY_NOTES),
-    "exact_label_png": (topics.EXACT_LABEL, _LABEL_NOTES),
-    "instance_png": (topics.INSTANCE, _INSTANCE_NOTES),
-    "image_png": (topics.IMAGE, {}),
-}
 
 
 def find_logs(folder: Path) -> list[Path]:
@@ -125,11 +110,11 @@ class _RecordingWriter:
         known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, (header.width, header.height))
         self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
         self._writer.write(camera_topic(camera, topics.STEREO), rest, log_ns=frame.stamp_ns)
-        for field, (channel, notes) in _CHANNELS.items():
+        for field, (channel, notes) in topics.PICTURES.items():
             png: bytes | None = getattr(frame, field)
             if png is None:
                 continue
-            if notes is _LABEL_NOTES:
+            if channel in (topics.LABEL, topics.EXACT_LABEL):
                 png = with_palette(png, self._palette)
             if channel == topics.IMAGE:
                 self._writer.end_chunk()
@@ -216,8 +201,7 @@ class LogReader:
         Raises:
             LogError: there is no such camera, or its calibration is damaged or impossible.
         """
-        if camera not in self.scene.cameras:
-            raise LogError(f"{camera} is not one of: {', '.join(self.scene.cameras)}", path=self.path, field="camera")
+        self._require_camera(camera)
         known = self._first(camera_topic(camera, topics.CALIBRATION))
         rest = self._first(camera_topic(camera, topics.STEREO))
         try:
@@ -267,9 +251,10 @@ class LogReader:
             images: whether to read the colour images, too.
 
         Raises:
-            LogError: what is read is damaged.
+            LogError: there is no such camera, or what is read is damaged.
         """
-        fields = {camera_topic(camera, channel): field for field, (channel, _) in _CHANNELS.items()}
+        self._require_camera(camera)
+        fields = {camera_topic(camera, channel): field for field, (channel, _) in topics.PICTURES.items()}
         if not images:
             del fields[camera_topic(camera, topics.IMAGE)]
         for stamp_ns, entries in groupby(self._container.entries(fields), key=lambda entry: entry.log_ns):
@@ -281,6 +266,10 @@ class LogReader:
                     label_png=pictures.pop("label_png", None),
                     **pictures,
                 )
+
+    def _require_camera(self, camera: str) -> None:
+        if camera not in self.scene.cameras:
+            raise LogError(f"{camera} is not one of: {', '.join(self.scene.cameras)}", path=self.path, field="camera")
 
     def _topic(self, entry: Entry) -> str:
         return self._container.summary.channels[entry.channel_id].topic

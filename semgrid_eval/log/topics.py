@@ -1,4 +1,8 @@
-"""Names of the topics and coordinate frames in a log."""
+"""Names of the topics and coordinate frames in a log, and what the channels of pictures say of their coding."""
+
+import json
+
+from semgrid_eval.classes import CITYSCAPES_LABELS
 
 IMAGE = "image"
 DISPARITY = "disparity"
@@ -19,6 +23,22 @@ BASE_FRAME = "base_link"  # ISO 8855 vehicle frame: x forward, y left, z up, on 
 ODOM_FRAME = "odom"  # where the vehicle was, and pointed to, at the first sample
 GRID_FRAME = "grid"  # moves with the vehicle and never turns
 MAP_FRAME = "map"  # x east, y north
+
+_DISPARITY_NOTES = {"coding": "d_px = (p - 1) / 256; p = 0 is invalid", "unit": "px"}
+_LABEL_NOTES = {"coding": "Cityscapes label ids", "names": json.dumps({e.label_id: e.name for e in CITYSCAPES_LABELS})}
+_INSTANCE_NOTES = {"coding": "actor id of each pixel; 0 is no actor"}
+PICTURES: dict[str, tuple[str, dict[str, str]]] = {
+    "disparity_png": (DISPARITY, _DISPARITY_NOTES),
+    "label_png": (LABEL, _LABEL_NOTES),
+    "exact_disparity_png": (EXACT_DISPARITY, _DISPARITY_NOTES),
+    "exact_label_png": (EXACT_LABEL, _LABEL_NOTES),
+    "instance_png": (INSTANCE, _INSTANCE_NOTES),
+    "image_png": (IMAGE, {}),
+}
+"""Channel of a camera and its metadata by field of `CameraFrame`, in the order of writing.
+
+The colour image, which scoring never reads, comes last and has a chunk of its own.
+"""
 
 
 def camera_topic(camera: str, channel: str) -> str:

@@ -80,6 +80,22 @@ def test_killed_worker_is_a_failure_that_is_named(tmp_path):
     assert "worker process was killed" in summary.failed["val/a"]
 
 
+@pytest.mark.parametrize("workers", [1, 2])
+def test_interrupted_conversion_leaves_whole_logs_and_goes_on_from_there(tmp_path, workers):
+    jobs = [job(name) for name in "abcdef"]
+
+    def interrupt(done, total, message=""):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        convert_recordings(jobs, tmp_path, workers=workers, progress=interrupt)
+    left = [f"val/{path.stem}" for path in sorted((tmp_path / "val").iterdir())]
+    assert left if workers == 2 else left == ["val/a"]  # other processes finish what they have begun
+    summary = convert(jobs, tmp_path)
+    assert summary.skipped == left
+    assert sorted([*summary.written, *summary.skipped]) == [f"val/{name}" for name in "abcdef"]
+
+
 def test_progress_names_every_recording_once(tmp_path):
     told = []
     jobs = [job("a"), job("b", partial(refuse, "is missing"))]

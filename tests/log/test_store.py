@@ -87,6 +87,8 @@ def test_two_passes_at_once_do_not_disturb_each_other(log):
 def test_unknown_camera_is_named_with_those_there_are(log):
     with pytest.raises(LogError, match=r"street\.mcap: camera: rear is not one of: front"):
         log.calibration("rear")
+    with pytest.raises(LogError, match=r"street\.mcap: camera: rear is not one of: front"):
+        next(log.frames("rear"))
 
 
 def test_same_recording_gives_the_same_bytes(log_path, tmp_path):
