@@ -77,8 +77,8 @@ class Ground:
     def at(self, x_m: NDArray[np.floating], y_m: NDArray[np.floating]) -> NDArray[np.uint8]:
         """Return the surfaces at points of any shape in the map frame."""
         height, width = self.surface.shape
-        column = ((x_m - self.west_m) * (1.0 / CELL_M)).astype(np.int32)
-        row = ((y_m - self.south_m) * (1.0 / CELL_M)).astype(np.int32)
+        column = np.floor((x_m - self.west_m) * (1.0 / CELL_M)).astype(np.int32)
+        row = np.floor((y_m - self.south_m) * (1.0 / CELL_M)).astype(np.int32)
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         index = np.where(inside, row * width + column, 0)
         found = np.take(self.surface.reshape(-1), index)

@@ -1,0 +1,27 @@
+"""A small simulated town, built once for all tests of a process."""
+
+import functools
+import tempfile
+from pathlib import Path
+
+from semgrid_eval.frames.synthetic.recordings import RecordingPlan, SyntheticConfig, plan_recordings
+from semgrid_eval.progress import silent
+
+SMALL = {"recordings": 4, "seed": 3, "towns": 2, "val_share": 0.25, "town_size_m": 250.0, "duration_s": 15.0}
+
+
+@functools.cache
+def town_cache() -> Path:
+    """Return the folder where the small towns of this process are kept; it vanishes with the process."""
+    folder = tempfile.TemporaryDirectory(prefix="semgrid-towns-")
+    _KEPT.append(folder)
+    return Path(folder.name)
+
+
+def small_plans(**changes) -> list[RecordingPlan]:
+    """Plan recordings of small pictures in two small towns."""
+    values = {**SMALL, "width": 128, "height": 64, **changes}
+    return plan_recordings(SyntheticConfig(**values), town_cache(), silent)
+
+
+_KEPT: list[tempfile.TemporaryDirectory] = []
