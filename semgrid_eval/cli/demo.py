@@ -1,12 +1,12 @@
 """`semgrid-eval demo`: from a simulated town to a report, with nothing to prepare."""
 
-import os
 import time
 from pathlib import Path
 
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
+from semgrid_eval.executors import available_cores, local_executor
 
 PRESET = "demo"
 
@@ -16,7 +16,13 @@ PRESET = "demo"
 @click.option("--recordings", type=click.IntRange(4, 10_000), default=80, show_default=True, help="Drives to simulate.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
 @click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
-@click.option("--workers", type=click.IntRange(1, 256), default=os.cpu_count() or 1, help="Processes at once.")
+@click.option(
+    "--workers",
+    type=click.IntRange(1, 256),
+    default=available_cores(),
+    show_default="all cores",
+    help="Processes at once.",
+)
 def command(out: Path, recordings: int, seed: int, device: str, workers: int) -> int:
     """Simulate a town, record drives through it as logs, train, score and report: a few minutes on two cores.
 
@@ -30,7 +36,7 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
     start_s = time.monotonic()
     logs, run = out / "logs", out / "run"
     summary = convert(logs, recordings=recordings, seed=seed, workers=workers)
-    options = RunOptions(device=device, workers=workers, grids=out / "grids", command=command_line())
+    options = RunOptions(device, out / "grids", command_line(), grid_executor=local_executor(workers))
     record = run_matrix(load_matrix(PRESET), logs, run, options, stage=progress)
     page = write_report(run)
     for row in record.rows:

@@ -1,19 +1,21 @@
 """`semgrid-eval grids`: build, or re-use, the grids of a folder of logs."""
 
-import os
 from pathlib import Path
 
 import click
 
 from semgrid_eval.cli.console import progress, say
 from semgrid_eval.config import load_yaml, parse_config
+from semgrid_eval.executors import available_cores, local_executor
 
 
 @click.command("grids", epilog="Example: semgrid-eval grids logs grids")
 @click.argument("logs", type=click.Path(path_type=Path, exists=True))
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
 @click.option("--config", type=click.Path(path_type=Path, dir_okay=False), help="Grid configuration (YAML).")
-@click.option("--workers", type=click.IntRange(1, 256), default=os.cpu_count() or 1, help="Logs at once.")
+@click.option(
+    "--workers", type=click.IntRange(1, 256), default=available_cores(), show_default="all cores", help="Logs at once."
+)
 def command(logs: Path, out: Path, config: Path | None, workers: int) -> int:
     """Build the semantic grids of all LOGS into the folder OUT.
 
@@ -25,7 +27,7 @@ def command(logs: Path, out: Path, config: Path | None, workers: int) -> int:
 
     grid_config = parse_config(GridConfig, load_yaml(config) or {}, path=config) if config else GridConfig()
     with progress("grids") as watch:
-        data = build_grids(find_logs(logs), out, grid_config, workers=workers, progress=watch)
+        data = build_grids(find_logs(logs), out, grid_config, executor=local_executor(workers), progress=watch)
     for reason in data.failed.values():
         say(f"Error: {reason}")
     say(f"{len(data.recordings)} recordings in {out}: {data.built} logs built, {data.reused} re-used")

@@ -1,20 +1,19 @@
 """Grids of whole recordings: read a log once, make the grids of every sensor, keep them by digest."""
 
-import multiprocessing
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, NO_POINT, class_map
 from semgrid_eval.errors import ConfigError, LogError, ResultError, SemgridError
+from semgrid_eval.executors import Executor, InProcess, WorkerDied
 from semgrid_eval.files import digest_value
 from semgrid_eval.frames.png import decode_gray
 from semgrid_eval.frames.types import CameraFrame, MotionSample
@@ -70,26 +69,39 @@ class GridDataSet:
 
 
 def build_grids(
-    logs: Sequence[Path], folder: Path, config: GridConfig, *, workers: int = 1, progress: Progress = silent
+    logs: Sequence[Path],
+    folder: Path,
+    config: GridConfig,
+    *,
+    executor: Executor | None = None,
+    progress: Progress = silent,
 ) -> GridDataSet:
-    """Make the grids of all logs, or take those that lie in `folder` already, several logs at once.
+    """Make the grids of all logs, or take those that lie in `folder` already, as many at once as `executor` works on.
 
     A log that fails is noted with its reason and the others go on. The order of recordings is that of `logs`.
     """
-    outcomes: dict[Path, tuple[list[GridRecording], bool] | str] = {}
-    for done, (log, outcome) in enumerate(_outcomes(logs, folder, config, workers), start=1):
-        outcomes[log] = outcome
-        progress(done, len(logs), log.stem)
     data = GridDataSet()
+    ready: dict[Path, list[GridRecording]] = {}
+    missing: list[Path] = []
     for log in logs:
-        outcome = outcomes[log]
-        if isinstance(outcome, str):
-            data.failed[str(log)] = outcome
+        try:
+            ready[log] = _read(_cache_file(log, folder, config), log)
+        except ResultError:
+            missing.append(log)  # not made yet, or damaged
+        except SemgridError as error:
+            data.failed[str(log)] = _about(log, error)
+    data.reused = len(ready)
+    work = partial(_build_and_keep, folder=folder, config=config)
+    for done, (index, failure) in enumerate((executor or InProcess()).run(work, missing), start=1):
+        log = missing[index]
+        progress(done, len(missing), log.stem)
+        if failure is not None:
+            data.failed[str(log)] = failure.reason if isinstance(failure, WorkerDied) else failure
             continue
-        recordings, reused = outcome
-        data.recordings.extend(recordings)
-        data.built += not reused
-        data.reused += reused
+        # Workers leave their grids on disk: reading them costs less than sending them between processes.
+        ready[log] = _read(_cache_file(log, folder, config), log)
+        data.built += 1
+    data.recordings = [recording for log in logs for recording in ready.get(log, [])]
     return data
 
 
@@ -201,37 +213,23 @@ def _camera(reader: LogReader, wanted: str | None, log: Path) -> str:
     raise LogError(f"camera {wanted or '(not given)'} is not one of: {', '.join(cameras)}", path=log, field="camera")
 
 
-def _outcomes(
-    logs: Sequence[Path], folder: Path, config: GridConfig, workers: int
-) -> Iterator[tuple[Path, tuple[list[GridRecording], bool] | str]]:
-    if workers <= 1 or len(logs) <= 1:
-        for log in logs:
-            yield log, _build_or_reuse(log, folder, config)
-        return
-    pool = ProcessPoolExecutor(
-        min(workers, len(logs)), multiprocessing.get_context("spawn"), initializer=cv2.setNumThreads, initargs=(1,)
-    )
-    with pool:
-        futures = {pool.submit(_build_or_reuse, log, folder, config): log for log in logs}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-
-
-def _build_or_reuse(log: Path, folder: Path, config: GridConfig) -> tuple[list[GridRecording], bool] | str:
+def _build_and_keep(log: Path, folder: Path, config: GridConfig) -> str | None:
+    """Make the grids of a log, or return why not."""
     try:
-        with closing(LogReader(log)) as reader:
-            key = {"log": reader.digest, "config": config.model_dump(mode="json"), "format": FORMAT_VERSION}
-        path = folder / f"{log.stem}-{digest_value(key)}.npz"
-        try:
-            return _read(path, log), True
-        except ResultError:
-            pass  # absent or damaged: make it anew
-        recordings = build_log(log, config)
-        _write(path, recordings)
+        _write(_cache_file(log, folder, config), build_log(log, config))
     except SemgridError as error:
-        message = str(error)
-        return message if str(log) in message else f"{log}: {message}"
-    return recordings, False
+        return _about(log, error)
+    return None
+
+
+def _cache_file(log: Path, folder: Path, config: GridConfig) -> Path:
+    with closing(LogReader(log)) as reader:
+        key = {"log": reader.digest, "config": config.model_dump(mode="json"), "format": FORMAT_VERSION}
+    return folder / f"{log.stem}-{digest_value(key)}.npz"
+
+
+def _about(log: Path, error: SemgridError) -> str:
+    return str(error) if str(log) in str(error) else f"{log}: {error}"
 
 
 def _write(path: Path, recordings: list[GridRecording]) -> None:

@@ -76,6 +76,13 @@ class Row(Config):
         return self.experiment or self.name.removeprefix("BL-").removeprefix("ED-")
 
     @property
+    def kind(self) -> str:
+        """Kind of model: `ED`, `BL`, or whatever stands before the first hyphen of the name of one's own."""
+        if self.trained:
+            return "ED"
+        return "BL" if self.model in BASELINES else self.name.partition("-")[0]
+
+    @property
     def label(self) -> str:
         """Name and, in words, what the row does; the horizon is always said (reading 2)."""
         what = {"ed": f"encoder-decoder d {self.network.depth}, f {self.network.features}", **BASELINES}

@@ -6,6 +6,7 @@ from pathlib import Path
 import torch
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.executors import Executor
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.build import GridDataSet, build_grids
 from semgrid_eval.grids.spec import GridConfig
@@ -23,24 +24,32 @@ class Sources:
         logs: the folder of logs.
         cache: folder in which built grids are kept.
         rows: all rows of the matrix, which tell the sensors that are needed.
-        workers: logs built at once.
+        executor: builds the logs' grids.
         device: where the grids of training and validation lie.
         stage: shows progress.
     """
 
     def __init__(
-        self, logs: Path, cache: Path, rows: Sequence[Row], *, workers: int, device: torch.device, stage: Stage
+        self, logs: Path, cache: Path, rows: Sequence[Row], *, executor: Executor, device: torch.device, stage: Stage
     ) -> None:
         self._logs = find_logs(logs)
-        self._cache, self._workers, self._device, self._stage = cache, workers, device, stage
+        self._cache, self._executor, self._device, self._stage = cache, executor, device, stage
         self._sensors: dict[str, list[str]] = {}
+        self._configs: dict[str, GridConfig] = {}
         for row in rows:
-            self._sensors.setdefault(grid_digest(row.grid), []).extend(row.sensors)
+            key = grid_digest(row.grid)
+            self._configs[key] = row.grid
+            self._sensors.setdefault(key, []).extend(row.sensors)
         self._sets: dict[str, GridDataSet] = {}
         self._stacked: dict[tuple[str, str], GridData] = {}
         self.failed: dict[str, str] = {}
         self.records: dict[str, LogRecord] = {}
         self.log_of: dict[str, str] = {}  # by name of the recording
+
+    def prepare(self) -> None:
+        """Build all grids of the matrix now, as many logs at once as the executor works on."""
+        for config in self._configs.values():
+            self._grids(config)
 
     def data(self, config: GridConfig, split: str) -> GridData:
         """Return the grids of all recordings of one split.
@@ -64,7 +73,7 @@ class Sources:
         key = grid_digest(config)
         if key not in self._sets:
             with self._stage("grids") as progress:
-                data_set = build_grids(self._logs, self._cache, config, workers=self._workers, progress=progress)
+                data_set = build_grids(self._logs, self._cache, config, executor=self._executor, progress=progress)
             self._sets[key] = data_set
             self.failed.update(data_set.failed)
             for recording in data_set.recordings:

@@ -4,6 +4,7 @@ from support.toy_world import Box, ToyWorld, street
 
 from semgrid_eval.classes import CLASS_NAMES, UNKNOWN
 from semgrid_eval.errors import ConfigError
+from semgrid_eval.executors import Processes
 from semgrid_eval.grids.build import build_grids, build_log
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.log.store import write_log
@@ -101,7 +102,7 @@ def test_a_log_that_fails_is_named_and_the_others_go_on(tmp_path):
     good, bad = tmp_path / "good.mcap", tmp_path / "bad.mcap"
     write_log(street(2, frames=2).recording("good"), good)
     bad.write_bytes(good.read_bytes()[:3000])
-    data = build_grids([bad, good], tmp_path / "grids", GridConfig(), workers=2)
+    data = build_grids([bad, good], tmp_path / "grids", GridConfig(), executor=Processes(2))
     assert [recording.name for recording in data.recordings] == ["good"]
     assert list(data.failed) == [str(bad)]
     assert "bad.mcap" in data.failed[str(bad)]

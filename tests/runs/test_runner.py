@@ -3,10 +3,12 @@ import re
 
 import numpy as np
 import pytest
+import torch
 import yaml
 from support.toy_world import street
 
 from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.executors import InProcess, Processes
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
@@ -27,10 +29,10 @@ def logs(tmp_path_factory):
     return folder
 
 
-def run(rows, logs, out, **defaults):
+def run(rows, logs, out, executor=None, **defaults):
     path = out.parent / f"{out.name}.yaml"
     path.write_text(yaml.safe_dump({"seed": 5, "defaults": {"window": WINDOW, **TINY, **defaults}, "rows": rows}))
-    options = RunOptions(device="cpu", workers=1, grids=out.parent / "grids", command="test")
+    options = RunOptions("cpu", out.parent / "grids", "test", executor or InProcess())
     return run_matrix(load_matrix(str(path)), logs, out, options)
 
 
@@ -147,3 +149,20 @@ def test_predictions_of_a_perfect_past_are_certain(logs, tmp_path):
     folder = results.result_folder(tmp_path / "run", record.rows[0].results[0])
     certainty = results.read_arrays(folder / "predictions.npz", ("certainty",))["certainty"]
     assert (np.asarray(certainty) == 255).all()
+
+
+def test_several_processes_give_the_same_bytes_as_one(logs, tmp_path):
+    rows = [
+        {"name": "BL-DC", "model": "newest"},
+        {"name": "ED-DC", "model": "ed", "repeats": 2},
+        {"name": "BL-none", "model": "newest", "validation_split": "test"},
+    ]
+    one = run(rows, logs, tmp_path / "one")
+    several = run(rows, logs, tmp_path / "several", Processes(2, threads=torch.get_num_threads()))
+    assert [(row.results, row.failure) for row in one.rows] == [(row.results, row.failure) for row in several.rows]
+    for row in one.rows:
+        for result_id in row.results:
+            for name in ("counts.npz", "predictions.npz"):
+                first, second = (results.result_folder(tmp_path / run, result_id) / name for run in ("one", "several"))
+                assert first.exists() == second.exists()
+                assert not first.exists() or first.read_bytes() == second.read_bytes()

@@ -1,0 +1,184 @@
+"""One unit of a run: one row with one seed, trained if need be, scored, and kept under the digest of all of it."""
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from semgrid_eval.arrays import write_arrays
+from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.files import atomic_folder, digest_files, digest_value
+from semgrid_eval.models.baselines import FuseAll, OverlaySensors, RepeatNewest
+from semgrid_eval.models.checkpoint import HISTORY_FILE
+from semgrid_eval.models.device import choose_precision
+from semgrid_eval.models.network import NetworkPredictor
+from semgrid_eval.models.predictor import Predictor, load_predictor
+from semgrid_eval.models.training import Trained, train
+from semgrid_eval.progress import Stage
+from semgrid_eval.runs.matrix import Row
+from semgrid_eval.runs.sources import Sources, grid_digest
+from semgrid_eval.scores import results
+from semgrid_eval.scores.evaluate import Evaluation, evaluate
+from semgrid_eval.sequences.dataset import WindowSet, select_windows, window_arrays
+from semgrid_eval.sequences.windows import WindowConfig, WindowPlan, training_windows, validation_windows
+
+
+class Worker:
+    """Trains and scores single units; holds the grids that they share.
+
+    Args:
+        out: folder of the run.
+        sources: the grids.
+        device: where models run.
+        example_seed: of the trained results whose predictions are kept for a report's examples.
+        stage: shows progress.
+    """
+
+    def __init__(self, out: Path, sources: Sources, device: torch.device, example_seed: int, stage: Stage) -> None:
+        self._out, self._sources, self._device, self._stage = out, sources, device, stage
+        self._example_seed = example_seed
+
+    def run(self, row: Row, seed: int | None) -> str:
+        """Make sure that the result of a row with one seed lies in the run's folder, and return its id.
+
+        Raises:
+            SemgridError: the row cannot be run; the message says why.
+        """
+        scored = self._window_set(row, row.validation_split, validation_windows)
+        windows_id = digest_value([scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
+        job = self._training(row, seed) if seed is not None else None
+        config = _config(row)
+        result_id = digest_value([results.FORMAT_VERSION, config, windows_id, job.id if job else None])
+        folder = results.result_folder(self._out, result_id)
+        if results.is_done(folder):
+            return result_id
+        trained = self._train(job, row) if job else None
+        with self._stage(f"score {row.name}") as progress:
+            evaluation = evaluate(_predictor(row, trained), scored, progress=progress)
+        self._keep_windows(scored, windows_id)
+        record = results.ResultRecord(
+            format_version=results.FORMAT_VERSION,
+            id=result_id,
+            config=config,
+            log_digests=tuple(sorted(set(scored.data.digests))),
+            seed=seed,
+            windows_id=windows_id,
+            windows=_window_records(scored, self._sources.log_of),
+            device=str(self._device),
+            train_seconds=round(trained.seconds, 3) if trained else None,
+            predict_seconds=round(evaluation.seconds, 6),
+            parameters=trained.network.parameter_count if trained else None,
+        )
+        history = job.folder / HISTORY_FILE if job else None
+        _keep_result(folder, record, evaluation, history, with_predictions=seed in (None, self._example_seed))
+        return result_id
+
+    def _window_set(self, row: Row, split: str, plan: Callable[[list[int], WindowConfig], WindowPlan]) -> WindowSet:
+        data = self._sources.data(row.grid, split)
+        windows = plan(data.frame_counts, row.window).windows
+        return select_windows(data, windows, sensors=row.sensors, translate=row.translate)
+
+    def _training(self, row: Row, seed: int) -> "_Training":
+        windows = self._window_set(row, row.train_split, training_windows)
+        watched = self._window_set(row, row.validation_split, validation_windows)
+        training_id = digest_value(
+            {
+                "network": row.network.model_dump(),
+                "training": row.training.model_dump(),
+                "precision": str(choose_precision(row.training.precision, self._device)),
+                "device": self._device.type,
+                "seed": seed,
+                "windows": [windows.digest(), watched.digest(), grid_digest(row.grid)],
+            }
+        )
+        return _Training(training_id, self._out / "trainings" / training_id, seed, windows, watched)
+
+    def _train(self, job: "_Training", row: Row) -> Trained:
+        with self._stage(f"train {row.name} (seed {job.seed})") as progress:
+            return train(
+                job.windows,
+                row.network,
+                row.training,
+                seed=job.seed,
+                device=self._device,
+                folder=job.folder,
+                progress=progress,
+                validation=job.watched,
+            )
+
+    def _keep_windows(self, windows: WindowSet, windows_id: str) -> None:
+        path = results.windows_file(self._out, windows_id)
+        if not path.is_file():
+            write_arrays(path, window_arrays(windows))
+
+
+@dataclass(frozen=True)
+class _Training:
+    """A training that a row asks for; rows that ask for the same one share its folder."""
+
+    id: str
+    folder: Path
+    seed: int
+    windows: WindowSet
+    watched: WindowSet
+
+
+def identity(row: Row) -> dict[str, object]:
+    """Return what of a row determines its numbers: everything but its names and its number of repeats."""
+    unused = {"name", "experiment", "repeats"} | (set() if row.trained else {"network", "training"})
+    return row.model_dump(mode="json", exclude=unused)
+
+
+def _config(row: Row) -> dict[str, object]:
+    """Return a row's identity and, for a model of one's own, the digest of its code."""
+    if ":" not in row.model:
+        return identity(row)
+    return {**identity(row), "code": digest_files([Path(row.model.rpartition(":")[0])])}
+
+
+def _predictor(row: Row, trained: Trained | None) -> Predictor:
+    if trained:
+        return NetworkPredictor(trained.network, trained.dtype)
+    if row.model == "newest":
+        return RepeatNewest()
+    if row.model == "overlay":
+        return OverlaySensors(next(sensor for sensor in row.sensors if row.overlay in sensor))
+    if row.model == "fuse":
+        return FuseAll()
+    return load_predictor(row.model)
+
+
+def _window_records(windows: WindowSet, log_of: dict[str, str]) -> tuple[results.WindowRecord, ...]:
+    data = windows.data
+    frames = windows.target_frames.cpu().numpy()
+    owners = np.searchsorted(data.first_frames, frames, side="right") - 1
+    return tuple(
+        results.WindowRecord(
+            recording=data.recordings[owner],
+            log=log_of[data.recordings[owner]],
+            target_frame=int(frame - data.first_frames[owner]),
+            target_stamp_ns=int(data.stamps_ns[frame]),
+        )
+        for frame, owner in zip(frames, owners, strict=True)
+    )
+
+
+def _keep_result(
+    folder: Path,
+    record: results.ResultRecord,
+    evaluation: Evaluation,
+    history: Path | None,
+    *,
+    with_predictions: bool,
+) -> None:
+    with atomic_folder(folder) as partial:
+        write_arrays(partial / "counts.npz", {"counts": evaluation.counts})
+        if with_predictions:
+            arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
+            write_arrays(partial / "predictions.npz", arrays)
+        if history:
+            shutil.copyfile(history, partial / "history.csv")
+        results.write_result(partial, record)
