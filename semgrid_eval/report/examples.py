@@ -64,6 +64,9 @@ def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
     rivals = [row for row in named if row is not None and row != main] or _default_rivals(main, rows, headline)
     others = [(row, reference_of(row, rows)) for row in rows if not row.is_baseline and row != main]
     found = [Contest(main, tuple(rivals))]
+    later = [row for row in rows if _asks_later(row, main)]
+    if later:
+        found.append(Contest(main, tuple(later)))
     return found + [Contest(row, (reference,)) for row, reference in others if reference is not None]
 
 
@@ -118,6 +121,13 @@ def _aligned_iou(result: Result, other: Result) -> Array:
     places = np.array([at.get(key_of(window), -1) for window in result.record.windows], np.intp)
     padded = np.vstack([theirs, np.full((1, CLASS_COUNT), np.nan)])
     return np.asarray(padded[places])
+
+
+def _asks_later(row: Row, main: Row) -> bool:
+    """Tell whether a row is the same model asked to look further ahead, at the same target frames."""
+    mine, theirs = main.record, row.record
+    alike = (mine.model, mine.sensors, mine.inputs) == (theirs.model, theirs.sensors, theirs.inputs)
+    return alike and row.run == main.run and theirs.horizon_steps > mine.horizon_steps
 
 
 def _row(rows: Sequence[Row], like: Row, model: str, experiment: str) -> Row | None:

@@ -1,6 +1,7 @@
 """What a figure of the report is: PNG and SVG, one style, and a form that follows a page's light or dark theme."""
 
 import io
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,10 +70,12 @@ def short(name: str) -> str:
 
 def finish(figure: Figure, name: str, source: str, caption: str) -> Plot:
     """Save a figure in both forms, the same figure always as the same bytes."""
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # it has done its work; without this, each form would be laid out again
     picture, drawing = io.BytesIO(), io.BytesIO()
-    figure.savefig(picture, format="png", dpi=160, metadata={"Software": None})
-    figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")  # names may be in any script
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # it has done its work; without this, each form would be laid out again
+        figure.savefig(picture, format="png", dpi=160, metadata={"Software": None})
+        figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})
     text = drawing.getvalue().decode()
     return Plot(name, picture.getvalue(), text[text.index("<svg") :], source, caption)

@@ -16,6 +16,7 @@ from semgrid_eval.files import atomic_folder
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.report import diagrams, exports, plots, provenance, tables
 from semgrid_eval.report.cells import Table
+from semgrid_eval.report.changes import changes_table
 from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, Headline, headline
 from semgrid_eval.report.estimates import RowScores, score_rows
 from semgrid_eval.report.examples import Contest, choose, choose_by_class, contests
@@ -115,13 +116,27 @@ def render_page(
 def page_tables(runs: Sequence[Run], scores: Scores) -> dict[str, Any]:
     """Make the page's tables of scores; a table with nothing to show is None."""
     if not scores:
-        return dict.fromkeys(("categories", "differences", "class_differences", "classes", "merged", "runs", "costs"))
+        return dict.fromkeys(
+            (
+                "categories",
+                "differences",
+                "class_differences",
+                "classes",
+                "changes",
+                "merged",
+                "windows",
+                "runs",
+                "costs",
+            )
+        )
     return {
         "categories": tables.category_values(scores),
         "differences": tables.difference_table("differences", scores, DIFFERENCE_COLUMNS),
         "class_differences": tables.difference_table("class-differences", scores, CLASS_NAMES),
         "classes": tables.class_values(scores),
+        "changes": changes_table(scores),
         "merged": tables.merged_values(scores),
+        "windows": tables.window_means(scores),
         "runs": tables.run_differences(scores, [each.tag for each in runs], DIFFERENCE_COLUMNS),
         "costs": tables.training_table(list(scores.values())),
     }

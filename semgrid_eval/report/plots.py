@@ -5,6 +5,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
@@ -145,4 +146,4 @@ def _training_curves(axes: Axes, row: Row, index: int) -> None:
 def _curve(history: Any, column: str) -> list[float]:  # noqa: ANN401 - a data frame or None
     if history is None or column not in history:
         return []
-    return [float(value) for value in history[column]]
+    return [float(value) for value in pd.to_numeric(history[column], errors="coerce")]

@@ -19,7 +19,14 @@ from semgrid_eval.report.cells import (
     value_cell,
 )
 from semgrid_eval.report.comparison import reference_of, verdict
-from semgrid_eval.report.estimates import CATEGORY_COLUMNS, MERGED_COLUMNS, Estimate, RowScores
+from semgrid_eval.report.estimates import (
+    CATEGORY_COLUMNS,
+    COLUMNS,
+    MERGED_COLUMNS,
+    Estimate,
+    RowScores,
+    score_columns,
+)
 from semgrid_eval.report.longform import target_cells
 from semgrid_eval.report.paper import paper_table
 from semgrid_eval.report.where import BANDS, ORIGINS, Where
@@ -59,6 +66,19 @@ def merged_values(scores: Scores) -> Table:
     """Show the categories with their classes merged before counting."""
     caption = "Category scores after merging the classes of a category, as the Cityscapes benchmark counts."
     return value_table("merged", caption, scores, MERGED_COLUMNS)
+
+
+def window_means(scores: Scores) -> Table:
+    """Show the mean over windows of each window's own scores, where the other tables pool their counts."""
+    rows = []
+    for name, entry in scores.items():
+        columns = [score_columns(result.counts.astype(np.int64)) for result in entry.row.results]
+        values = np.concatenate(columns)[:, [COLUMNS.index(column) for column in CATEGORY_COLUMNS]]
+        present = np.isfinite(values)
+        total, number = np.where(present, values, 0.0).sum(axis=0), present.sum(axis=0)
+        rows.append((name, np.divide(total, number, out=np.full(len(number), np.nan), where=number > 0)))
+    caption = "Mean over windows of each window's own category scores; windows without a category are left out."
+    return _plain_table("windows", caption, [LABELS[column] for column in CATEGORY_COLUMNS], rows)
 
 
 def difference_table(name: str, scores: Scores, columns: Sequence[str]) -> Table | None:

@@ -89,6 +89,17 @@ def test_the_papers_contest_comes_first_and_others_follow(run):
     ]
 
 
+def test_longer_horizons_are_shown_in_a_row(tmp_path):
+    kinds = (FakeRow("DC", "BL"), *(FakeRow(f"PH{k}", "ED", 0.1, 1, horizon_steps=k + 1) for k in (2, 1)))
+    run = make_fake_run(tmp_path / "run", rows=(FakeRow("DC", "ED", 0.1, 1), *kinds), recordings=2)
+    loaded = load_runs([run])[0].rows
+    got = contests(loaded, headline(score_rows(loaded, np.random.default_rng(0), draws=2)))
+    assert [(c.model.name, [r.name for r in c.rivals]) for c in got] == [
+        ("ED-DC", ["BL-DC"]),
+        ("ED-DC", ["ED-PH2", "ED-PH1"]),
+    ]
+
+
 @pytest.mark.parametrize(
     ("rows", "model", "rivals"),
     [

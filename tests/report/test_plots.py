@@ -1,5 +1,6 @@
 import io
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -58,7 +59,7 @@ def test_no_curve_without_training(rows):
 
 def test_a_history_with_other_columns_or_gaps_is_no_obstacle(rows):
     row = next(row for row in rows if row.name == "ED-DC")
-    object.__setattr__(row.results[0], "history", pd.DataFrame({"epoch": [1], "loss": [np.nan]}))
+    object.__setattr__(row.results[0], "history", pd.DataFrame({"epoch": [1, 2], "loss": [np.nan, "bad"]}))
     assert len(plots.training_plots([row])) == 1
 
 
@@ -67,6 +68,15 @@ def test_several_horizons_give_a_curve(tmp_path):
     run = make_fake_run(tmp_path / "run", rows=tuple(steps), recordings=2, windows=1)
     scores = score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=2)
     assert [plot.name for plot in plots.horizon_plots(scores)] == ["horizon"]
+
+
+def test_names_in_any_script_are_drawn(rows, scores):
+    entry = scores["ED-DC"]
+    record = entry.row.record.model_copy(update={"model": "\u6a21\u578b \x1b[0m", "experiment": "DC"})
+    odd = {"odd": replace(entry, row=replace(entry.row, name="\u9053\u8def", record=record))}
+    panel = plots.category_plots(odd)[0]
+    assert "\u9053\u8def" in _texts(panel.svg)
+    assert "\u6a21\u578b  [0m" in _texts(panel.svg)
 
 
 def test_one_horizon_gives_none(scores):
