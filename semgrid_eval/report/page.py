@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -19,16 +18,16 @@ from semgrid_eval.report.cells import Table
 from semgrid_eval.report.changes import changes_table
 from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, Headline, headline
 from semgrid_eval.report.estimates import RowScores, score_rows
-from semgrid_eval.report.examples import Contest, choose, choose_by_class, contests
+from semgrid_eval.report.examples import choose, choose_by_class, contests
 from semgrid_eval.report.figure import Plot
-from semgrid_eval.report.panels import Example, example_windows
+from semgrid_eval.report.panels import Group, example_group
 from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.reading import Row, Run, load_runs
 from semgrid_eval.report.summary import summarise
 from semgrid_eval.report.where import Where, locate_rows
 
 PAGE = "index.html"
-_SEED = 20190623
+_SEED = 20190623  # any number does; a fixed one gives the same run the same intervals
 _BEST, _WORST, _OTHER = 3, 3, 1
 
 Scores = Mapping[str, RowScores]
@@ -113,22 +112,8 @@ def render_page(
     )
 
 
-def page_tables(runs: Sequence[Run], scores: Scores) -> dict[str, Any]:
-    """Make the page's tables of scores; a table with nothing to show is None."""
-    if not scores:
-        return dict.fromkeys(
-            (
-                "categories",
-                "differences",
-                "class_differences",
-                "classes",
-                "changes",
-                "merged",
-                "windows",
-                "runs",
-                "costs",
-            )
-        )
+def page_tables(runs: Sequence[Run], scores: Scores) -> dict[str, Table | None]:
+    """Make the page's tables of scores; one with nothing to show is None or has no lines."""
     return {
         "categories": tables.category_values(scores),
         "differences": tables.difference_table("differences", scores, DIFFERENCE_COLUMNS),
@@ -148,37 +133,22 @@ def confusion_tables(scores: Scores, found: Headline | None) -> list[Table]:
     return [tables.confusion_table(scores[row.name], f"confusion-{i}") for i, row in enumerate(rows)]
 
 
-def example_groups(rows: Sequence[Row], found: Headline | None) -> list[dict[str, Any]]:
+def example_groups(rows: Sequence[Row], found: Headline | None) -> list[Group]:
     """Draw the example windows: the main contest, its classes, and one good and one bad window of the others."""
-    groups = []
-    for index, contest in enumerate(contests(rows, found)):
-        main = index == 0
-        picks = choose(contest, best=_BEST if main else _OTHER, worst=_WORST if main else _OTHER)
-        groups.append(_group(contest, *example_windows(contest, picks), open_=main))
-        if main:
-            groups.append(_group(contest, *example_windows(contest, choose_by_class(contest)), open_=False))
-            groups[-1]["title"] += ", class by class"
-    return groups
-
-
-def _group(contest: Contest, windows: Sequence[Example], problem: str, *, open_: bool) -> dict[str, Any]:
-    against = " and ".join(rival.name for rival in contest.rivals)
-    title = f"{contest.model.name} against {against}" if against else contest.model.name
-    seed = contest.result.record.seed
-    return {
-        "title": title,
-        "rule": contest.rule,
-        "seed": seed,
-        "windows": windows,
-        "problem": problem,
-        "open": open_,
-    }
+    chosen = contests(rows, found)
+    if not chosen:
+        return []
+    main, *others = chosen
+    overall = example_group(main, choose(main, best=_BEST, worst=_WORST), shown=True)
+    by_class = example_group(main, choose_by_class(main), note=", class by class")
+    return [overall, by_class, *(example_group(each, choose(each, best=_OTHER, worst=_OTHER)) for each in others)]
 
 
 def _check_replaceable(out: Path) -> None:
     if not out.exists():
         return
-    if not out.is_dir() or (any(out.iterdir()) and not (out / exports.RECORD).is_file()):
+    is_report = (out / exports.RECORD).is_file() and (out / PAGE).is_file()
+    if not out.is_dir() or (any(out.iterdir()) and not is_report):
         raise InputError("exists and is no report; name another folder", path=out, field="out")
 
 

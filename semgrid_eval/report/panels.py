@@ -43,14 +43,29 @@ class Example:
     legend: tuple[tuple[str, str], ...]
 
 
-def example_windows(contest: Contest, picks: Sequence[Pick]) -> tuple[list[Example], str]:
-    """Draw the chosen windows of a contest, and say in words where their arrays cannot be read."""
-    if not picks:
-        return [], ""
+@dataclass(frozen=True)
+class Group:
+    """The example windows of one contest, or in words why there are none."""
+
+    title: str
+    rule: str
+    seed: int | None
+    windows: tuple[Example, ...]
+    problem: str
+    shown: bool  # whether the group is open when the page is opened
+
+
+def example_group(contest: Contest, picks: Sequence[Pick], *, note: str = "", shown: bool = False) -> Group:
+    """Draw the chosen windows of a contest; arrays that cannot be read become the group's problem."""
+    windows: tuple[Example, ...] = ()
+    problem = "" if picks else "No window has enough cells of any class."
     try:
-        return list(_draw(contest, picks)), ""
+        windows = tuple(_draw(contest, picks)) if picks else ()
     except (SemgridError, ValueError, IndexError) as error:
-        return [], f"The pictures of {contest.model.name} cannot be shown: {error}"
+        problem = f"The pictures of {contest.model.name} cannot be shown: {error}"
+    against = " and ".join(rival.name for rival in contest.rivals)
+    title = f"{contest.model.name} against {against}" if against else contest.model.name
+    return Group(title + note, contest.rule, contest.result.record.seed, windows, problem, shown)
 
 
 def shown_time(stamp_ns: int) -> str:

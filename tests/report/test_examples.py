@@ -8,7 +8,7 @@ from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.report.comparison import headline
 from semgrid_eval.report.estimates import score_rows
 from semgrid_eval.report.examples import MIN_CELLS, Contest, choose, choose_by_class, contests, rule_values
-from semgrid_eval.report.panels import example_windows, shown_time
+from semgrid_eval.report.panels import example_group, shown_time
 from semgrid_eval.report.reading import load_runs
 
 CAR, ROAD = CLASS_NAMES.index("car"), CLASS_NAMES.index("road")
@@ -117,9 +117,9 @@ def test_other_runs_get_a_sensible_contest(tmp_path, rows, model, rivals):
 def test_an_example_shows_inputs_target_predictions_and_certainty(run):
     rows = _rows(run)
     contest = Contest(rows["ED-Sp2"], (rows["BL-Sp2"],))
-    windows, problem = example_windows(contest, choose(contest, best=1, worst=0))
-    assert problem == ""
-    titles = [picture.title for picture in windows[0].pictures]
+    group = example_group(contest, choose(contest, best=1, worst=0))
+    assert group.problem == ""
+    titles = [picture.title for picture in group.windows[0].pictures]
     assert titles == [
         "Input 1 of 2, lower",
         "Input 1 of 2, upper",
@@ -139,9 +139,9 @@ def test_lost_arrays_are_told_not_raised(tmp_path):
     contest = Contest(rows["ED-DC"], (rows["BL-DC"],))
     for result in rows["ED-DC"].results:
         (result.folder / "predictions.npz").unlink()
-    windows, problem = example_windows(contest, choose(contest, best=1, worst=1))
-    assert windows == []
-    assert "predictions.npz" in problem
+    group = example_group(contest, choose(contest, best=1, worst=1))
+    assert group.windows == ()
+    assert "predictions.npz" in group.problem
 
 
 def test_times_are_dates_only_where_the_stamp_is_one():

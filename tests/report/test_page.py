@@ -142,7 +142,8 @@ def test_failed_rows_only(tmp_path):
 def test_one_row_only_in_the_default_place_where_an_old_report_is_replaced(tmp_path):
     old = tmp_path / "run" / "report"
     old.mkdir(parents=True)
-    (old / "report.json").touch()
+    for name in ("report.json", "index.html"):
+        (old / name).touch()
     (old / "old.txt").touch()
     page = _report_of(tmp_path, rows=(FakeRow("DC", "BL"),))
     assert page == old / "index.html"
