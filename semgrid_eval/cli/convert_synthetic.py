@@ -47,7 +47,7 @@ def _option(name: str, kind: "type | click.Choice[str]", text: str) -> Callable[
     )
 
 
-@click.command("synthetic", epilog="Example: semgrid-eval convert synthetic logs --recordings 6 --seed 1 --towns 2")
+@click.command("synthetic", epilog="Example: semgrid-eval convert synthetic logs --recordings 2 --towns 2 --town-size-m 250 --duration-s 15")
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
 @click.option("--recordings", type=int, required=True, help="How many, of 30 frames each.")
 @_option("seed", int, "The same seed gives the same bytes.")

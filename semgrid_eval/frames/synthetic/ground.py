@@ -17,7 +17,7 @@ CELL_M = 0.2
 MARGIN_M = 120.0
 _SHIFT_BITS = 4
 _DASH_M, _GAP_M = 3.0, 5.0
-_STRIPE_M = 0.5
+_STRIPE_M, _STRIPE_PERIOD_M = 0.4, 1.2
 
 
 class Surface(IntEnum):
@@ -111,15 +111,13 @@ class GroundPainter:
         cv2.fillPoly(self._surface, [self._fixed_point(points_m)], int(surface), cv2.LINE_8, _SHIFT_BITS)
 
     def line(self, points_m: NDArray[np.float64], width_m: float, surface: Surface) -> None:
-        """Draw a line (N, 2) of some width, with square joints where it bends."""
+        """Draw a line (N, 2) of some width; like all shapes it covers every cell that it touches."""
         for start, end in pairwise(points_m):
             length = np.linalg.norm(end - start)
             if length > 0.0:
                 ahead = (end - start) / length
                 side = np.array([-ahead[1], ahead[0]]) * width_m / 2.0
-                reach = ahead * min(0.1, width_m / 2.0)
-                corners = [start + side - reach, end + side + reach, end - side + reach, start - side - reach]
-                self.polygon(np.array(corners), surface)
+                self.polygon(np.array([start + side, end + side, end - side, start - side]), surface)
 
     def finished(self) -> Ground:
         """Return the ground as drawn so far."""
@@ -138,7 +136,7 @@ def paint_streets(network: Network, painter: GroundPainter) -> None:
     for use, surface in _LANE_SURFACES.items():
         lanes = [lane for lane in network.lanes if lane.use is use]
         for lane in lanes:
-            painter.line(lane.line_m, lane.width_m + CELL_M, surface)
+            painter.line(lane.line_m, lane.width_m, surface)
         for lane in lanes if use is LaneUse.CAR else ():
             _paint_markings(lane, painter)
     for shape_m in network.walking_areas_m:
@@ -151,15 +149,15 @@ def _paint_markings(lane: Lane, painter: GroundPainter) -> None:
     """Draw the dashes left of a lane and the line where it stops."""
     line = Polyline.through(lane.line_m)
     for start_m in np.arange(1.0, line.length_m - _DASH_M, _DASH_M + _GAP_M):
-        painter.line(line.piece(start_m, start_m + _DASH_M, lane.width_m / 2.0), 0.2, Surface.MARKING)
+        painter.line(line.piece(start_m, start_m + _DASH_M, lane.width_m / 2.0), 0.1, Surface.MARKING)
     if lane.ends_at_light:
         stop_m = line.length_m - 0.4
         ends = [line.at(stop_m, side * lane.width_m / 2.0)[:2] for side in (-1.0, 1.0)]
-        painter.line(np.array(ends), 0.4, Surface.MARKING)
+        painter.line(np.array(ends), 0.3, Surface.MARKING)
 
 
 def _paint_crossing(line_m: NDArray[np.float64], width_m: float, painter: GroundPainter) -> None:
     """Draw the stripes of a crossing over the road that it crosses."""
     line = Polyline.through(line_m)
-    for start_m in np.arange(0.3, line.length_m - _STRIPE_M, 2.0 * _STRIPE_M):
+    for start_m in np.arange(0.3, line.length_m - _STRIPE_M, _STRIPE_PERIOD_M):
         painter.line(line.piece(start_m, start_m + _STRIPE_M), width_m - 1.0, Surface.CROSSING)
