@@ -25,8 +25,8 @@ def write_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
             archive.writestr(entry, buffer.getvalue())
 
 
-def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    """Read the named arrays of an npz, sizes bounded, nothing pickled.
+def read_arrays(path: Path, names: tuple[str, ...], *, optional: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
+    """Read the named arrays of an npz, and those of `optional` that it has; sizes bounded, nothing pickled.
 
     Raises:
         ResultError: the file is missing, damaged, too large or lacks an array.
@@ -37,7 +37,7 @@ def read_arrays(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
         if size > _ARRAY_LIMIT_BYTES:
             raise ResultError(f"would need {size >> 20} MiB", path=path)
         with np.load(path, allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in names}
+            return {name: arrays[name] for name in (*names, *(name for name in optional if name in arrays))}
     except KeyError as error:
         raise ResultError(f"has no array {error}", path=path) from error
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:

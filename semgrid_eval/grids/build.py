@@ -17,6 +17,7 @@ from semgrid_eval.executors import Executor, InProcess, WorkerDied
 from semgrid_eval.files import digest_value
 from semgrid_eval.frames.png import decode_gray
 from semgrid_eval.frames.types import CameraFrame, MotionSample
+from semgrid_eval.grids.actors import TrueActors
 from semgrid_eval.grids.geometry import GroundRays, ground_rays, nearest_indices
 from semgrid_eval.grids.motion import integrate_motion
 from semgrid_eval.grids.rasterise import LabelledImage, count_points, rasterise
@@ -24,9 +25,12 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.progress import Progress, silent
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
-StretchArrays = tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64]]
+StretchArrays = tuple[
+    NDArray[np.int64], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64], NDArray[np.uint8] | None
+]
+_ARRAYS = ("stamps_ns", "grids", "position_m", "yaw_rad")
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,8 @@ class GridRecording:
         grids: (S, F, H, W) uint8 class ids; each grid is centred on the vehicle at its own time.
         position_m: (F, 2) of the vehicle, forward and left of the first frame.
         yaw_rad: (F,) heading against the first frame.
+        actors: (F, H, W) uint8, where true actors stand at each frame's time: bits `STANDING` and `MOVING` of the
+            grid's spec; None where the log does not hold the truth.
     """
 
     name: str
@@ -56,6 +62,7 @@ class GridRecording:
     grids: NDArray[np.uint8]
     position_m: NDArray[np.float64]
     yaw_rad: NDArray[np.float64]
+    actors: NDArray[np.uint8] | None = None
 
 
 @dataclass
@@ -116,11 +123,12 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
         camera = _camera(reader, config.camera, log)
         motion = list(reader.motion())
         frames = reader.frames(camera)
+        truth = TrueActors(reader, config.spec)
         stretches: list[StretchArrays] = []
         while stretch := list(_take(frames, config.stretch_frames)):
             if stretches and len(stretch) < config.stretch_frames:
                 break  # the rest of a log that was cut: too short for the windows of the others
-            stretches.append(_build_stretch(stretch, motion, reader, camera, config))
+            stretches.append(_build_stretch(stretch, motion, truth, _Stretch(reader, camera, config), config))
         if not stretches:
             raise LogError(f"camera {camera} has no frames", path=log)
         many = len(stretches) > 1
@@ -180,13 +188,12 @@ class _Stretch:
 
 
 def _build_stretch(
-    frames: list[CameraFrame], motion: list[MotionSample], reader: LogReader, camera: str, config: GridConfig
+    frames: list[CameraFrame], motion: list[MotionSample], truth: TrueActors, stretch: _Stretch, config: GridConfig
 ) -> StretchArrays:
     stamps_ns = np.array([frame.stamp_ns for frame in frames], np.int64)
     position_m, yaw_rad = integrate_motion(motion, stamps_ns, config.integrator)
-    stretch = _Stretch(reader, camera, config)
     grids = np.stack([stretch.grids(frame, yaw) for frame, yaw in zip(frames, yaw_rad, strict=True)], axis=1)
-    return stamps_ns, grids, position_m, yaw_rad
+    return stamps_ns, grids, position_m, yaw_rad, truth.flags(stamps_ns, yaw_rad)
 
 
 def _take(frames: Iterator[CameraFrame], count: int) -> Iterator[CameraFrame]:
@@ -239,8 +246,10 @@ def _write(path: Path, recordings: list[GridRecording]) -> None:
         "log": np.array([first.digest, first.split, first.dataset, *first.sensors]),
     }
     for number, recording in enumerate(recordings):
-        for name in ("stamps_ns", "grids", "position_m", "yaw_rad"):
+        for name in _ARRAYS:
             arrays[f"{name}_{number}"] = getattr(recording, name)
+        if recording.actors is not None:
+            arrays[f"actors_{number}"] = recording.actors
     write_arrays(path, arrays)
 
 
@@ -249,8 +258,8 @@ def _read(path: Path, log: Path) -> list[GridRecording]:
     digest, split, dataset, *sensors = (str(value) for value in head["log"])
     recordings = []
     for number, name in enumerate(head["names"]):
-        keys = [f"{key}_{number}" for key in ("stamps_ns", "grids", "position_m", "yaw_rad")]
-        arrays = read_arrays(path, tuple(keys))
-        values = (arrays[key] for key in keys)
-        recordings.append(GridRecording(str(name), str(log), digest, split, dataset, tuple(sensors), *values))
+        keys, truth = tuple(f"{key}_{number}" for key in _ARRAYS), f"actors_{number}"
+        found = read_arrays(path, keys, optional=(truth,))
+        arrays = {key.removesuffix(f"_{number}"): array for key, array in found.items()}
+        recordings.append(GridRecording(str(name), str(log), digest, split, dataset, tuple(sensors), **arrays))
     return recordings

@@ -7,6 +7,8 @@ from pydantic import Field, model_validator
 from semgrid_eval.config import Config
 
 TARGET_SENSOR = "full"
+STANDING, MOVING = 1, 2
+"""Bits of the flags that say whose footprint a cell lies in."""
 
 
 class GridSpec(Config):
