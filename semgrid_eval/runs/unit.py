@@ -175,7 +175,7 @@ def _keep_result(
     with_predictions: bool,
 ) -> None:
     with atomic_folder(folder) as partial:
-        write_arrays(partial / "counts.npz", {"counts": evaluation.counts})
+        results.write_counts(partial, evaluation.counts, evaluation.region_counts)
         if with_predictions:
             arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
             write_arrays(partial / "predictions.npz", arrays)

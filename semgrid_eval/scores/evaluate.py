@@ -8,6 +8,7 @@ import torch
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.grids.spec import MOVING, STANDING
 from semgrid_eval.models.predictor import Predictor
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores.iou import Counts, confusion
@@ -20,12 +21,14 @@ class Evaluation:
 
     Args:
         counts: (N, C, C) cells by target and predicted class, mask M left out.
+        region_counts: the same of cells near `moving` and near `standing` actors alone; empty without the truth.
         prediction: (N, H, W) uint8 class ids.
         certainty: (N, H, W) uint8, the highest score of each cell, 255 = 1.
         seconds: time spent predicting, without gathering inputs.
     """
 
     counts: Counts
+    region_counts: dict[str, Counts]
     prediction: NDArray[np.uint8]
     certainty: NDArray[np.uint8]
     seconds: float
@@ -40,8 +43,11 @@ def evaluate(predictor: Predictor, windows: WindowSet, *, batch: int = 16, progr
     if not len(windows):
         raise InputError("there is no window to score")
     counts, predictions, certainties = [], [], []
+    region_counts: dict[str, list[Counts]] = {}
     seconds = 0.0
-    for part in windows.batches(batch):
+    for start in range(0, len(windows), batch):
+        chosen = slice(start, start + batch)
+        part = windows.batch(chosen)
         start_s = time.perf_counter()
         with torch.inference_mode():
             certainty, prediction = predictor(part).max(dim=1)
@@ -49,6 +55,23 @@ def evaluate(predictor: Predictor, windows: WindowSet, *, batch: int = 16, progr
         seconds += time.perf_counter() - start_s
         predictions.append(answer)
         certainties.append((certainty.float().clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy())
-        counts.append(confusion(part.target.cpu().numpy(), answer, part.mask.cpu().numpy()))
+        target, mask = part.target.cpu().numpy(), part.mask.cpu().numpy()
+        counts.append(confusion(target, answer, mask))
+        for name, region in actor_regions(windows.actors(chosen)).items():
+            region_counts.setdefault(name, []).append(confusion(target, answer, mask | ~region))
         progress(sum(map(len, predictions)), len(windows))
-    return Evaluation(np.concatenate(counts), np.concatenate(predictions), np.concatenate(certainties), seconds)
+    return Evaluation(
+        np.concatenate(counts),
+        {name: np.concatenate(parts) for name, parts in region_counts.items()},
+        np.concatenate(predictions),
+        np.concatenate(certainties),
+        seconds,
+    )
+
+
+def actor_regions(actors: NDArray[np.uint8] | None) -> dict[str, NDArray[np.bool_]]:
+    """Split flags (N, H, W) into the cells near moving and near standing actors; cells near both are moving."""
+    if actors is None:
+        return {}
+    moving = (actors & MOVING) != 0
+    return {"moving": moving, "standing": ((actors & STANDING) != 0) & ~moving}

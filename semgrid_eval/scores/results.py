@@ -3,14 +3,20 @@
 ```
 RUN/run.json                   RunRecord: provenance, logs, rows and, for each row, its results by id
 RUN/results/<id>/result.json   ResultRecord
-RUN/results/<id>/counts.npz    counts (N, C, C) int64, [target, prediction], mask M left out
+RUN/results/<id>/counts.npz    counts (N, C, C) int64, [target, prediction], mask M left out; where a log has the truth
+                               counts_moving and counts_standing alike: cells near moving actors, or near standing
+                               ones alone. Near is within a cell of the footprint at the target's time, or of the
+                               newest input's footprint moved by the ego motion, where a repeated input has its ghost
 RUN/results/<id>/history.csv   of trained models: epoch, updates, learning_rate, loss, validation_loss, seconds
 RUN/results/<id>/predictions.npz   prediction (N, H, W) uint8 class ids, certainty (N, H, W) uint8 (255 = 1.0)
-RUN/windows/<id>.npz           inputs (N, S, T, H, W) uint8 aligned, target (N, H, W) uint8, mask (N, H, W) bool
+RUN/windows/<id>.npz           inputs (N, S, T, H, W) uint8 aligned, target (N, H, W) uint8, mask (N, H, W) bool;
+                               where a log has the truth actors (N, H, W) uint8: 1 near a standing actor, 2 near a
+                               moving one, 3 near both, zeros for windows of logs without the truth
 ```
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,6 +30,8 @@ from semgrid_eval.errors import ConfigError, ResultError
 from semgrid_eval.files import read_json, write_json
 
 FORMAT_VERSION = 1
+REGIONS = ("moving", "standing")
+"""Where counts are kept apart: near actors that move, and near those that stand."""
 
 
 class LogRecord(Config):
@@ -148,6 +156,7 @@ def write_result(folder: Path, record: ResultRecord) -> None:
 def is_done(folder: Path) -> bool:
     """Tell whether a result parses, matches its id and has counts of the right shape."""
     try:
+        read_region_counts(folder)
         return len(read_counts(folder)) == len(read_result(folder).windows)
     except (ResultError, ConfigError, OSError, ValueError):
         return False
@@ -159,16 +168,42 @@ def read_counts(folder: Path) -> NDArray[np.int64]:
     Raises:
         ResultError: they are missing or malformed.
     """
-    counts = read_arrays(folder / "counts.npz", ("counts",))["counts"]
-    if counts.ndim != 3 or counts.shape[1:] != (CLASS_COUNT, CLASS_COUNT) or counts.dtype != np.int64:
-        raise ResultError(f"has shape {counts.shape}, type {counts.dtype}", path=folder / "counts.npz", field="counts")
-    return counts.astype(np.int64, copy=False)
+    path = folder / "counts.npz"
+    return _checked_counts(read_arrays(path, ("counts",))["counts"], path, "counts")
+
+
+def write_counts(folder: Path, counts: NDArray[np.int64], region_counts: dict[str, NDArray[np.int64]]) -> None:
+    """Write the confusion counts (N, C, C) of a result, and those of regions by their names in `REGIONS`."""
+    regions = {f"counts_{name}": region_counts[name] for name in REGIONS if name in region_counts}
+    write_arrays(folder / "counts.npz", {"counts": counts, **regions})
+
+
+def read_region_counts(folder: Path) -> dict[str, NDArray[np.int64]]:
+    """Read the confusion counts (N, C, C) near `moving` and `standing` actors; empty where no log had the truth.
+
+    Raises:
+        ResultError: they are malformed, or not of as many windows as the counts of all cells.
+    """
+    path = folder / "counts.npz"
+    keys = {name: f"counts_{name}" for name in REGIONS}
+    found = read_arrays(path, ("counts",), optional=tuple(keys.values()))
+    regions = {name: _checked_counts(found[key], path, key) for name, key in keys.items() if key in found}
+    for name, counts in regions.items():
+        if len(counts) != len(found["counts"]):
+            raise ResultError(f"has {len(counts)} windows, not {len(found['counts'])}", path=path, field=keys[name])
+    return regions
 
 
 def read_history(folder: Path) -> pd.DataFrame | None:
     """Read the training history of a result, None where nothing was trained."""
     path = folder / "history.csv"
     return pd.read_csv(path) if path.is_file() else None
+
+
+def _checked_counts(counts: NDArray[Any], path: Path, name: str) -> NDArray[np.int64]:
+    if counts.ndim != 3 or counts.shape[1:] != (CLASS_COUNT, CLASS_COUNT) or counts.dtype != np.int64:
+        raise ResultError(f"has shape {counts.shape}, type {counts.dtype}", path=path, field=name)
+    return counts
 
 
 def _check_version(found: int, path: Path) -> None:

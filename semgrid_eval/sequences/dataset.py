@@ -33,6 +33,8 @@ class GridData:
         stamps_ns: (F,) int64.
         position_m: (F, 2) float64, forward and left in the grid orientation of the frame's own recording.
         cell_m: edge of a cell.
+        actors: for each recording (its F, H, W) flags of true actors, None where its log does not hold the truth.
+            They stay on the host: scores are split by them, and nothing is predicted from them.
     """
 
     grids: Tensor
@@ -44,6 +46,7 @@ class GridData:
     stamps_ns: NDArray[np.int64]
     position_m: NDArray[np.float64]
     cell_m: float
+    actors: tuple[NDArray[np.uint8] | None, ...] = ()
 
     def to(self, device: torch.device) -> "GridData":
         """Give the same data with its grids on another device."""
@@ -134,6 +137,28 @@ class WindowSet:
             mask=covered_without_truth(aligned, target),
         )
 
+    def actors(self, chosen: slice) -> NDArray[np.uint8] | None:
+        """Flag where true actors are at the target's time, or were in the newest input: -> (B, H, W).
+
+        The newest input's footprints are moved into the target's place, like its grid: there a model without any idea
+        of motion leaves a ghost. Windows of recordings without the truth have no flags; None where no recording has it.
+        """
+        if all(flags is None for flags in self.data.actors):
+            return None
+        target, newest = self.target_frames[chosen].cpu().numpy(), self.inputs[chosen, -1].cpu().numpy()
+        shift_cells = self.shift_cells[chosen, -1].cpu()
+        ghosts = shift_grids(torch.from_numpy(self._flags_of(newest)), shift_cells).numpy()
+        return np.asarray(self._flags_of(target) | ghosts, np.uint8)
+
+    def _flags_of(self, frames: NDArray[np.int64]) -> NDArray[np.uint8]:
+        result = np.zeros((len(frames), *self.data.grids.shape[-2:]), np.uint8)
+        owners = np.searchsorted(self.data.first_frames, frames, side="right") - 1
+        for flags, frame, owner in zip(result, frames, owners, strict=True):
+            known = self.data.actors[owner]
+            if known is not None:
+                flags[:] = known[frame - self.data.first_frames[owner]]
+        return result
+
     def batches(self, size: int) -> Iterator[WindowBatch]:
         """Pass over all windows in order, `size` at a time."""
         for start in range(0, len(self), size):
@@ -176,6 +201,7 @@ def stack_recordings(
         stamps_ns=np.concatenate([entry.stamps_ns for entry in recordings]),
         position_m=np.concatenate([entry.position_m for entry in recordings]),
         cell_m=cell_m,
+        actors=tuple(entry.actors for entry in recordings),
     )
 
 
@@ -242,11 +268,12 @@ def covered_without_truth(aligned: Tensor, target: Tensor) -> Tensor:
 
 
 def window_arrays(windows: WindowSet, *, batch: int = 64) -> dict[str, NDArray[np.uint8] | NDArray[np.bool_]]:
-    """Give aligned inputs (N, S, T, H, W), target and mask (N, H, W), as kept in a run's `windows` folder."""
+    """Give what a run keeps: aligned inputs (N, S, T, H, W), target, mask and, with the truth, actors (N, H, W)."""
     aligned = replace(windows, translate=True)
     parts = [(part.past.cpu(), part.target.cpu(), part.mask.cpu()) for part in aligned.batches(batch)]
     inputs, target, mask = (torch.cat(column).numpy() for column in zip(*parts, strict=True))
-    return {"inputs": inputs, "target": target, "mask": mask}
+    actors = windows.actors(slice(None))
+    return {"inputs": inputs, "target": target, "mask": mask, **({} if actors is None else {"actors": actors})}
 
 
 def _within(index: Tensor, size: int) -> Tensor:

@@ -134,6 +134,31 @@ def test_window_arrays_are_aligned_and_do_not_depend_on_the_batch():
     assert np.array_equal(arrays["inputs"], aligned.past)
 
 
+@pytest.mark.parametrize("translate", [True, False])
+def test_actors_lie_at_the_target_and_where_the_newest_input_saw_them(translate):
+    recordings = [random_recording(seed, truth=seed != 1) for seed in range(3)]
+    data = stack_recordings(recordings, cell_m=0.5)
+    plan = training_windows(data.frame_counts, WindowConfig(horizon_steps=2))
+    windows = select_windows(data, plan.windows, sensors=["full"], translate=translate)
+    flags = np.concatenate([windows.actors(slice(start, start + 7)) for start in range(0, len(windows), 7)])
+    for window, found in zip(plan.windows, flags, strict=True):
+        source = recordings[window.recording]
+        newest, target = window.input_frames[-1], window.target_frame
+        expected = np.zeros((16, 16), np.uint8)
+        if source.actors is not None:
+            shift = np.rint((source.position_m[target] - source.position_m[newest]) / 0.5).astype(int)
+            expected = source.actors[target] | slow_shift(source.actors[newest], *shift)
+        np.testing.assert_array_equal(found, expected)
+    assert np.array_equal(window_arrays(windows)["actors"], flags)
+
+
+def test_without_the_truth_there_are_no_actors():
+    data = stack_recordings([random_recording(0)], cell_m=0.5)
+    windows = select_windows(data, [Window(0, (0, 5), 10)], sensors=["full"])
+    assert windows.actors(slice(0, 1)) is None
+    assert "actors" not in window_arrays(windows)
+
+
 def test_only_needed_sensors_are_kept():
     data = stack_recordings([random_recording(0, sensors=SENSORS)], cell_m=0.5, sensors=["lower"])
     assert data.sensors == ("lower", "full")

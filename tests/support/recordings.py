@@ -10,7 +10,12 @@ FRAME_NS = 58_823_529
 
 
 def recording(
-    grids: NDArray[np.uint8], *, name: str = "one", sensors: tuple[str, ...] = ("full",), position_m: object = None
+    grids: NDArray[np.uint8],
+    *,
+    name: str = "one",
+    sensors: tuple[str, ...] = ("full",),
+    position_m: object = None,
+    actors: NDArray[np.uint8] | None = None,
 ) -> GridRecording:
     """Wrap grids (S, F, H, W); the vehicle stands still unless positions (F, 2) are given."""
     frames = grids.shape[1]
@@ -25,17 +30,19 @@ def recording(
         grids=grids,
         position_m=np.zeros((frames, 2)) if position_m is None else np.asarray(position_m, np.float64),
         yaw_rad=np.zeros(frames),
+        actors=actors,
     )
 
 
 def random_recording(
-    seed: int, *, frames: int = 30, size: int = 16, sensors: tuple[str, ...] = ("full",)
+    seed: int, *, frames: int = 30, size: int = 16, sensors: tuple[str, ...] = ("full",), truth: bool = False
 ) -> GridRecording:
-    """Make random classes on a random way."""
+    """Make random classes on a random way, and random flags of actors where the `truth` is wanted."""
     random = np.random.default_rng(seed)
     grids = random.integers(0, CLASS_COUNT, (len(sensors), frames, size, size), dtype=np.uint8)
     position_m = np.cumsum(random.normal(0.3, 0.5, (frames, 2)), axis=0)
-    return recording(grids, name=f"random {seed}", sensors=sensors, position_m=position_m)
+    actors = random.integers(0, 4, (frames, size, size), dtype=np.uint8) if truth else None
+    return recording(grids, name=f"random {seed}", sensors=sensors, position_m=position_m, actors=actors)
 
 
 def drifting_blocks(seed: int, *, frames: int = 12, size: int = 16) -> GridRecording:

@@ -1,0 +1,63 @@
+"""Calibration: against slow loops, and by hand."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from semgrid_eval.classes import UNKNOWN
+from semgrid_eval.scores.calibration import certainty_counts, expected_calibration_error, reliability
+
+SHAPE = (2, 3, 4)
+GRIDS = arrays(np.uint8, SHAPE, elements=st.integers(0, 3))
+COUNTS = arrays(np.int64, (256, 2), elements=st.integers(0, 9), fill=st.just(0))
+
+
+@settings(max_examples=40)
+@given(GRIDS, GRIDS, arrays(np.uint8, SHAPE), arrays(np.bool_, SHAPE))
+def test_certainty_is_counted_of_known_cells_outside_the_mask(target, prediction, certainty, mask):
+    expected = np.zeros((256, 2), int)
+    for at in np.ndindex(SHAPE):
+        if not mask[at] and (target[at] != UNKNOWN or prediction[at] != UNKNOWN):
+            expected[certainty[at], int(target[at] == prediction[at])] += 1
+    np.testing.assert_array_equal(certainty_counts(target, prediction, certainty, mask), expected)
+
+
+def slow_bins(counts, bins):
+    """Cells of each bin, one by one, as (certainty, right)."""
+    found = [[] for _ in range(bins)]
+    for level in range(256):
+        number = next(b for b in range(bins) if b == bins - 1 or level * bins < 255 * (b + 1))
+        for right in (0, 1):
+            found[number] += [(level / 255, right)] * int(counts[level, right])
+    return found
+
+
+@settings(max_examples=40)
+@given(COUNTS, st.integers(1, 20))
+def test_bins_and_error_equal_going_through_the_cells(counts, bins):
+    table, error, cells = reliability(counts, bins), 0.0, int(counts.sum())
+    for number, found in enumerate(slow_bins(counts, bins)):
+        assert table.cells[number] == len(found)
+        if not found:
+            assert math.isnan(table.certainty[number])
+            assert math.isnan(table.right[number])
+            continue
+        certainty, right = (sum(values) / len(found) for values in zip(*found, strict=True))
+        assert table.certainty[number] == pytest.approx(certainty)
+        assert table.right[number] == pytest.approx(right)
+        error += abs(certainty - right) * len(found) / cells
+    assert expected_calibration_error(counts, bins) == (
+        pytest.approx(error, abs=1e-12) if cells else pytest.approx(math.nan, nan_ok=True)
+    )
+
+
+def test_who_is_always_certain_errs_as_often_as_wrong():
+    counts = np.zeros((256, 2), np.int64)
+    counts[255] = [1, 3]
+    assert expected_calibration_error(counts) == 0.25
+    counts[0] = [4, 0]  # never certain and never right: perfectly calibrated
+    assert expected_calibration_error(counts) == 0.125

@@ -1,0 +1,51 @@
+"""Scoring a predictor: counts of all cells and of those near actors, against a loop over cells."""
+
+import numpy as np
+import pytest
+from support.recordings import random_recording
+
+from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.errors import InputError
+from semgrid_eval.models.baselines import RepeatNewest
+from semgrid_eval.scores.evaluate import evaluate
+from semgrid_eval.sequences.dataset import select_windows, stack_recordings, window_arrays
+from semgrid_eval.sequences.windows import WindowConfig, validation_windows
+
+
+def windows_of(*recordings):
+    data = stack_recordings(recordings, cell_m=0.5)
+    plan = validation_windows(data.frame_counts, WindowConfig())
+    return select_windows(data, plan.windows, sensors=["full"])
+
+
+def slow_counts(kept, prediction, wanted):
+    """Count cell by cell; `wanted` says of flags whether a cell counts."""
+    counts = np.zeros((len(prediction), CLASS_COUNT, CLASS_COUNT), int)
+    for n, row, column in np.ndindex(prediction.shape):
+        at = n, row, column
+        if not kept["mask"][at] and wanted(int(kept["actors"][at])):
+            counts[n, kept["target"][at], prediction[at]] += 1
+    return counts
+
+
+@pytest.mark.parametrize("batch", [2, 16])
+def test_regions_equal_counting_cell_by_cell(batch):
+    windows = windows_of(*(random_recording(seed, truth=seed != 2) for seed in range(5)))
+    scored = evaluate(RepeatNewest(), windows, batch=batch)
+    kept = window_arrays(windows)
+    np.testing.assert_array_equal(scored.counts, slow_counts(kept, scored.prediction, lambda flags: True))
+    moving, standing = scored.region_counts["moving"], scored.region_counts["standing"]
+    np.testing.assert_array_equal(moving, slow_counts(kept, scored.prediction, lambda flags: flags in (2, 3)))
+    np.testing.assert_array_equal(standing, slow_counts(kept, scored.prediction, lambda flags: flags == 1))
+    assert [bool(counts.sum()) for counts in moving] == [True, True, False, True, True]  # number 2 has no truth
+
+
+def test_without_the_truth_there_are_no_regions():
+    assert evaluate(RepeatNewest(), windows_of(random_recording(0))).region_counts == {}
+
+
+def test_no_window_is_an_error():
+    windows = windows_of(random_recording(0))
+    empty = type(windows)(**{**vars(windows), "target_frames": windows.target_frames[:0]})
+    with pytest.raises(InputError, match="no window to score"):
+        evaluate(RepeatNewest(), empty)
