@@ -118,7 +118,7 @@ def _bicycle(place: tuple[float, float, float], rng: np.random.Generator) -> lis
     parts = [
         (0.52, (0.0, 0.66), (0.62, 0.06), dark),
         (-0.52, (0.0, 0.66), (0.62, 0.06), dark),
-        (0.0, (0.35, 0.85), (0.95, 0.08), frame),
+        (0.0, (0.4, 0.7), (0.95, 0.08), frame),
         (0.42, (0.9, 1.02), (0.08, 0.5), dark),
     ]
     cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)

@@ -12,7 +12,7 @@ from semgrid_eval.frames.synthetic.traffic import Snapshot
 from semgrid_eval.frames.types import Pose
 
 _SIGHT_M = 160.0
-_BEHIND_M, _ASIDE_M, _WIDENING = 15.0, 30.0, 0.75  # what throws shadows into the picture is kept, too
+_BEHIND_M, _ASIDE_M, _WIDENING = 9.0, 9.0, 0.55  # what throws shadows into the picture is kept, too
 
 
 class Stage:
