@@ -47,7 +47,10 @@ def _option(name: str, kind: "type | click.Choice[str]", text: str) -> Callable[
     )
 
 
-@click.command("synthetic", epilog="Example: semgrid-eval convert synthetic logs --recordings 2 --towns 2 --town-size-m 250 --duration-s 15")
+@click.command(
+    "synthetic",
+    epilog="Example: semgrid-eval convert synthetic logs --recordings 2 --towns 2 --town-size-m 250 --duration-s 15",
+)
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
 @click.option("--recordings", type=int, required=True, help="How many, of 30 frames each.")
 @_option("seed", int, "The same seed gives the same bytes.")
@@ -57,7 +60,7 @@ def _option(name: str, kind: "type | click.Choice[str]", text: str) -> Callable[
 @_option("duration_s", float, "Simulated time of a town from which recordings are taken.")
 @_option("width", int, "Of the images in pixels.")
 @_option("height", int, "Of the images in pixels.")
-@_option("noise", click.Choice(["modelled", "exact"]), "Errors of labels, disparity and motion, or none.")
+@_option("noise", click.Choice(["modelled", "matched", "exact"]), "Errors of labels, disparity and motion.")
 @click.option(
     "--cache", type=click.Path(path_type=Path, file_okay=False), help="Folder of towns.  [default: OUT/.towns]"
 )

@@ -6,38 +6,25 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.frames.synthetic import motion
 from semgrid_eval.frames.synthetic.bodies import actor_ids, heights_m
 from semgrid_eval.frames.synthetic.drives import FRAME_COUNT, FRAME_RATE_HZ, Drive, ego_path
-from semgrid_eval.frames.synthetic.noise import DisparityErrors, DisparityNoise, LabelErrors, LabelNoise
+from semgrid_eval.frames.synthetic.rig import Rig
 from semgrid_eval.frames.synthetic.road_users import ROAD_USERS
-from semgrid_eval.frames.synthetic.sensors import Camera, View, cityscapes_camera
+from semgrid_eval.frames.synthetic.sensors import Camera, cityscapes_camera
 from semgrid_eval.frames.synthetic.shading import draw_sunlight
 from semgrid_eval.frames.synthetic.stage import Stage
 from semgrid_eval.frames.synthetic.town import load_town
 from semgrid_eval.frames.synthetic.traffic import Snapshot
-from semgrid_eval.frames.types import Actor, CameraFrame, Moment, MotionSample, Pose, Recording
+from semgrid_eval.frames.types import Actor, Moment, MotionSample, Pose, Recording
 
 CAMERA_NAME = "front"
 RENDER_VERSION = 1
 """Counts changes to what a plan renders to; logs of another version are rendered anew."""
 STAMP_JITTER_S = 0.001
-# Speed counts more than size here. OpenCV before 4.12 has no choice of filter and ignores it.
-_FILTER, _NO_FILTER, _FILTER_UP = 19, 8, 32
-_COLOUR_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, 0, _FILTER, _NO_FILTER]
-_GREY_PNG = [
-    cv2.IMWRITE_PNG_COMPRESSION,
-    1,
-    cv2.IMWRITE_PNG_STRATEGY,
-    cv2.IMWRITE_PNG_STRATEGY_RLE,
-    _FILTER,
-    _FILTER_UP,
-]
 
 
 @dataclass(frozen=True)
@@ -53,7 +40,7 @@ class RecordingPlan:
         seed: of the recording's random numbers.
         width_px: of the images.
         height_px: of the images.
-        noise: `modelled`, or `exact` for perfect labels, disparity and motion.
+        noise: `modelled`, `matched`, or `exact` for perfect labels, disparity and motion.
     """
 
     name: str
@@ -102,53 +89,21 @@ def _moments(plan: RecordingPlan) -> Iterator[Moment]:
     town = load_town(plan.town)
     path = ego_path(town.traffic, plan.drive)
     assert path is not None, "a plan's drive was checked when it was chosen"
-    stamps, reports, light, disparities, labels = np.random.default_rng(plan.seed).spawn(5)
+    stamps, reports, light, errors = np.random.default_rng(plan.seed).spawn(4)
     times_s = plan.drive.start_s + np.arange(FRAME_COUNT) / FRAME_RATE_HZ
     times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, FRAME_COUNT - 1))
-    is_exact = plan.noise == "exact"
-    reported = motion.report(path, times_s, motion.EXACT_MOTION if is_exact else motion.MotionNoise(), reports)
+    motion_noise = motion.EXACT_MOTION if plan.noise == "exact" else motion.MotionNoise()
+    reported = motion.report(path, times_s, motion_noise, reports)
     camera = Camera(cityscapes_camera(plan.width_px, plan.height_px), plan.width_px, plan.height_px)
-    errors = (
-        None if is_exact else _Errors(DisparityErrors(DisparityNoise(), disparities), LabelErrors(LabelNoise(), labels))
-    )
-    stage = Stage(town, camera, draw_sunlight(light), path.at(float(times_s[0]))[:2])
+    rig = Rig(camera, plan.noise, errors)
+    stage = Stage(town, rig.cameras, draw_sunlight(light), path.at(float(times_s[0]))[:2])
     for time_s, (speed_mps, yaw_rate_radps) in zip(times_s, reported, strict=True):
         stamp_ns = round(float(time_s) * 1e9)
         pose = Pose(stamp_ns, *path.at(float(time_s))[:3])
         others = stage.others(float(time_s), pose, plan.drive.actor)
-        view, image = stage.picture(others, float(time_s), pose)
+        frame = rig.frame(stamp_ns, stage.pictures(others, float(time_s), pose))
         sample = MotionSample(stamp_ns, float(speed_mps), float(yaw_rate_radps))
-        frame = _frame(stamp_ns, camera, view, image, errors)
         yield Moment(stamp_ns, {CAMERA_NAME: frame}, (sample,), pose, (*_actors(others), *_actors(stage.parked)))
-
-
-@dataclass(frozen=True)
-class _Errors:
-    """The errors of one recording's frames, which depend on those of the frames before."""
-
-    disparity: DisparityErrors
-    labels: LabelErrors
-
-
-def _frame(stamp_ns: int, camera: Camera, view: View, image: NDArray[np.uint8], errors: _Errors | None) -> CameraFrame:
-    shape = (camera.height_px, camera.width_px)
-    exact_px = camera.disparity_px(view.depth_m).reshape(shape)
-    exact_label = view.label.reshape(shape)
-    return CameraFrame(
-        stamp_ns=stamp_ns,
-        image_png=_png(image, _COLOUR_PNG),
-        disparity_png=_png(coded_disparity(errors.disparity.add(exact_px) if errors else exact_px), _GREY_PNG),
-        label_png=_png(errors.labels.add(exact_label) if errors else exact_label, _GREY_PNG),
-        exact_label_png=_png(exact_label, _GREY_PNG),
-        exact_disparity_png=_png(coded_disparity(exact_px), _GREY_PNG),
-        instance_png=_png(view.instance.reshape(shape), _GREY_PNG),
-    )
-
-
-def coded_disparity(disparity_px: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Code disparities (H, W) as Cityscapes does: p = 256 d + 1, and 0 for what is not positive or too large."""
-    coded = np.rint(disparity_px * np.float32(256.0)) + np.float32(1.0)
-    return np.where((disparity_px > 0.0) & (coded <= 65535.0), coded, 0.0).astype(np.uint16)
 
 
 def _actors(group: Snapshot) -> list[Actor]:
@@ -162,9 +117,3 @@ def _actors(group: Snapshot) -> list[Actor]:
         size_m = (user.length_m, user.width_m, height_m)
         found.append(Actor(actor_id, user.label_id, x_m, y_m, yaw_rad, *size_m, velocity_x, velocity_y))
     return found
-
-
-def _png(image: NDArray[np.uint8] | NDArray[np.uint16], parameters: list[int]) -> bytes:
-    done, data = cv2.imencode(".png", image, parameters)
-    assert done, "OpenCV encodes every 8 or 16 bit image"
-    return data.tobytes()

@@ -1,5 +1,7 @@
 """The part of a town that one recording can see, who is on it, and the pictures taken of it."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,16 +23,15 @@ class Stage:
     Its frame is the map frame with the origin moved to that place.
     """
 
-    def __init__(self, town: Town, camera: Camera, sunlight: Sunlight, place_m: tuple[float, float]) -> None:
+    def __init__(self, town: Town, cameras: Sequence[Camera], sunlight: Sunlight, place_m: tuple[float, float]) -> None:
         self._place_m = place_m
-        self._camera = camera
         self._ground = town.scene.ground
         self._traffic = town.traffic
         corners = town.scene.soup.triangles_m[:, 0, :2]
         near = np.linalg.norm(corners - np.array(place_m, np.float32), axis=1) < _SIGHT_M
         self._still = town.scene.soup.where(near).moved(-place_m[0], -place_m[1])
         self._still_caster = RayCaster(self._still.triangles_m)
-        self._painter = Painter(camera, sunlight, self._still)
+        self._painters = [(camera, Painter(camera, sunlight, self._still)) for camera in cameras]
         self.parked = town.scene.parked.where(_is_near(town.scene.parked, *place_m))
 
     def others(self, time_s: float, pose: Pose, ego: int) -> Snapshot:
@@ -38,14 +39,17 @@ class Stage:
         moving = self._traffic.at(time_s)
         return moving.where(_is_near(moving, pose.x_m, pose.y_m) & (moving.actor != ego))
 
-    def picture(self, others: Snapshot, time_s: float, pose: Pose) -> tuple[View, NDArray[np.uint8]]:
-        """Return what the camera sees from a pose of the vehicle, and its colour image (H, W, 3)."""
+    def pictures(self, others: Snapshot, time_s: float, pose: Pose) -> list[tuple[View, NDArray[np.uint8]]]:
+        """Return what each camera sees from a pose of the vehicle, and its colour image (H, W, 3)."""
         boxes = boxes_of(_in_sight(others, pose), time_s)
         movers = soup_of_boxes(boxes).moved(-self._place_m[0], -self._place_m[1])
         casters = (self._still_caster, RayCaster(movers.triangles_m))
         soup = Soup.joined([self._still, movers])
-        view = look(self._camera, pose, casters, soup, self._ground, self._place_m)
-        return view, self._painter.paint(view, casters, movers)
+        pictures = []
+        for camera, painter in self._painters:
+            view = look(camera, pose, casters, soup, self._ground, self._place_m)
+            pictures.append((view, painter.paint(view, casters, movers)))
+        return pictures
 
 
 def _is_near(actors: Snapshot, x_m: float, y_m: float) -> NDArray[np.bool_]:

@@ -220,3 +220,14 @@ def test_absurd_wishes_are_refused_by_name(changes, message):
 def test_a_town_that_was_removed_is_named(plans, tmp_path):
     with pytest.raises(InputError, match="gone: holds no complete town"):
         next(iter(render_recording(replace(plans[0], town=tmp_path / "gone")).moments()))
+
+
+def test_matched_disparity_is_near_the_truth_where_it_is_found():
+    plan = replace(small_plans()[0], noise="matched", width_px=512, height_px=256)
+    frame = front(next(iter(render_recording(plan).moments())))
+    exact, found = (pixels(png).astype(float) for png in (frame.exact_disparity_png, frame.disparity_png))
+    assert found.shape == (256, 512)
+    both = (exact > 256) & (found > 0)
+    assert both.sum() > 0.6 * (exact > 256).sum()
+    assert np.median(np.abs(found - exact)[both]) / 256 < 0.5
+    assert pixels(frame.label_png).shape == pixels(frame.instance_png).shape == (256, 512)
