@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from semgrid_eval.config import Config, load_yaml, parse_config
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
+from semgrid_eval.models.flow import FlowConfig
 from semgrid_eval.models.network import NetworkConfig
 from semgrid_eval.models.training import TrainingConfig
 from semgrid_eval.sequences.windows import WindowConfig
@@ -20,6 +21,8 @@ BASELINES = {
     "newest": "newest input",
     "overlay": "newest input of one sensor drawn over the other's",
     "fuse": "all inputs overlaid, newest known cell wins",
+    "table": "likeliest class given the inputs' classes in the cell, counted on the training windows",
+    "flow": "all inputs overlaid, what is seen moving between the newest two moved on",
 }
 ROW_LIMIT = 10_000
 
@@ -30,10 +33,11 @@ class Row(Config):
     Args:
         name: unique in the matrix, like `ED-Sp2`; axes fill in `{key}` places.
         experiment: the group in which a report compares rows; the name without `BL-` or `ED-` if not given.
-        model: `ed`, a baseline (`newest`, `overlay`, `fuse`), or `path.py:Class` of one's own.
+        model: `ed`, a baseline (`newest`, `overlay`, `fuse`, `table`, `flow`), or `path.py:Class` of one's own.
         sensors: inputs, from the grid config's sensors.
         translate: whether inputs are moved to the target's time (T2); the paper's NT rows do not.
         overlay: which sensor the `overlay` baseline draws last (reading 20).
+        flow: what the `flow` baseline takes as evidence of motion.
         repeats: trainings with different seeds.
     """
 
@@ -43,6 +47,7 @@ class Row(Config):
     sensors: tuple[str, ...] = Field((TARGET_SENSOR,), min_length=1)
     translate: bool = True
     overlay: Literal["upper", "lower"] = "upper"
+    flow: FlowConfig = FlowConfig()
     repeats: int = Field(1, ge=1, le=1000)
     train_split: str = "train"
     validation_split: str = "val"

@@ -14,8 +14,10 @@ from semgrid_eval.files import atomic_folder, digest_files, digest_value
 from semgrid_eval.models.baselines import FuseAll, OverlaySensors, RepeatNewest
 from semgrid_eval.models.checkpoint import HISTORY_FILE
 from semgrid_eval.models.device import choose_precision
+from semgrid_eval.models.flow import MoveOn
 from semgrid_eval.models.network import NetworkPredictor
 from semgrid_eval.models.predictor import Predictor, load_predictor
+from semgrid_eval.models.table import count_table
 from semgrid_eval.models.training import Trained, train
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.matrix import Row
@@ -50,14 +52,16 @@ class Worker:
         scored = self._window_set(row, row.validation_split, validation_windows)
         windows_id = digest_value([scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
         job = self._training(row, seed) if seed is not None else None
+        counted = self._window_set(row, row.train_split, training_windows) if row.model == "table" else None
         config = _config(row)
-        result_id = digest_value([results.FORMAT_VERSION, config, windows_id, job.id if job else None])
+        learned_from = job.id if job else counted.digest() if counted is not None else None
+        result_id = digest_value([results.FORMAT_VERSION, config, windows_id, learned_from])
         folder = results.result_folder(self._out, result_id)
         if results.is_done(folder):
             return result_id
         trained = self._train(job, row) if job else None
         with self._stage(f"score {row.name}") as progress:
-            evaluation = evaluate(_predictor(row, trained), scored, progress=progress)
+            evaluation = evaluate(_predictor(row, trained, counted), scored, progress=progress)
         self._keep_windows(scored, windows_id)
         record = results.ResultRecord(
             format_version=results.FORMAT_VERSION,
@@ -129,6 +133,7 @@ class _Training:
 def identity(row: Row) -> dict[str, object]:
     """Return what of a row determines its numbers: everything but its names and its number of repeats."""
     unused = {"name", "experiment", "repeats"} | (set() if row.trained else {"network", "training"})
+    unused |= set() if row.model == "flow" else {"flow"}
     return row.model_dump(mode="json", exclude=unused)
 
 
@@ -139,15 +144,20 @@ def _config(row: Row) -> dict[str, object]:
     return {**identity(row), "code": digest_files([Path(row.model.rpartition(":")[0])])}
 
 
-def _predictor(row: Row, trained: Trained | None) -> Predictor:
+def _predictor(row: Row, trained: Trained | None, counted: WindowSet | None) -> Predictor:
     if trained:
         return NetworkPredictor(trained.network, trained.dtype)
-    if row.model == "newest":
-        return RepeatNewest()
-    if row.model == "overlay":
-        return OverlaySensors(next(sensor for sensor in row.sensors if row.overlay in sensor))
-    if row.model == "fuse":
-        return FuseAll()
+    if counted is not None:
+        return count_table(counted)
+    match row.model:
+        case "newest":
+            return RepeatNewest()
+        case "overlay":
+            return OverlaySensors(next(sensor for sensor in row.sensors if row.overlay in sensor))
+        case "fuse":
+            return FuseAll()
+        case "flow":
+            return MoveOn(row.flow, row.grid.spec.cell_m)
     return load_predictor(row.model)
 
 

@@ -71,7 +71,7 @@ def test_rows_override_defaults_key_by_key(tmp_path):
             r"m\.yaml: row 'a': netwrok: unknown key; .*network",
         ),
         ([{"name": "a", "model": "ed", "network": {"debth": 3}}], r"row 'a': network\.debth: unknown key; .*depth"),
-        ([{"name": "a", "model": "de"}], "row 'a': .*'de' is not one of ed, newest, overlay, fuse"),
+        ([{"name": "a", "model": "de"}], "row 'a': .*'de' is not one of ed, newest, overlay, fuse, table, flow"),
         ([{"name": "a", "model": "ed", "sensors": ["left"]}], "row 'a': .*'left' is not one of full, split1_upper"),
         ([{"name": "a", "model": "overlay"}], "overlay needs two sensors"),
         ([{"name": "a", "model": "ed"}] * 2, "rows.name: 'a' is the name of 2 rows"),

@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import re
 
@@ -7,8 +8,10 @@ import torch
 import yaml
 from support.toy_world import street
 
-from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.classes import CLASS_NAMES, LABEL_ID
+from semgrid_eval.errors import InputError
 from semgrid_eval.executors import InProcess, Processes
+from semgrid_eval.frames.types import Actor, Pose
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
@@ -144,6 +147,60 @@ def test_a_model_of_ones_own_is_scored_like_any_other(logs, tmp_path):
     assert score(tmp_path / "run", record, "mine") == score(tmp_path / "run", record, "BL-DC")
 
 
+def test_a_counted_table_is_told_apart_by_what_it_was_counted_on(logs, tmp_path):
+    rows = [
+        {"name": "BL-Table", "model": "table"},
+        {"name": "BL-Table-val", "model": "table", "train_split": "val"},
+        {"name": "BL-none", "model": "table", "train_split": "test"},
+        {"name": "BL-Flow", "model": "flow"},
+        {"name": "BL-Flow-lax", "model": "flow", "flow": {"overlap": 0.1}},
+        {"name": "BL-Fuse", "model": "fuse"},
+    ]
+    record = run(rows, logs, tmp_path / "run")
+    found = {row.name: row.results for row in record.rows}
+    assert found.pop("BL-none") == ()
+    assert len(set(found.values())) == 5
+    fewer = tmp_path / "fewer"
+    for log in sorted(logs.rglob("*.mcap"))[1:]:  # without the first training log
+        (fewer / log.parent.name).mkdir(parents=True, exist_ok=True)
+        (fewer / log.parent.name / log.name).hardlink_to(log)
+    again = {row.name: row.results for row in run(rows, fewer, tmp_path / "again").rows}
+    assert again["BL-Table"] != found["BL-Table"]
+    assert all(again[name] == found[name] for name in ("BL-Table-val", "BL-Flow", "BL-Fuse"))
+    assert score(tmp_path / "run", record, "BL-Table-val") != score(tmp_path / "run", record, "BL-Table")
+
+
+def test_truth_in_the_logs_gives_scores_near_moving_and_standing_actors(tmp_path):
+    for number, truth in enumerate((True, False)):
+        recording = street(number, frames=9).recording(f"toy_{number:06}_000000")
+        car = Actor(7, LABEL_ID["car"], 25.0, 0.0, 0.0, 4.4, 1.8, 1.5, 3.0, 0.0)
+        parked = dataclasses.replace(car, actor_id=8, y_m=5.0, velocity_x_mps=0.0)
+        known = {"pose": Pose(0, 0.0, 0.0, 0.0), "actors": (car, parked)} if truth else {}
+        write_log(with_truth(recording, known), tmp_path / "logs" / f"toy{number}.mcap")
+    record = run([{"name": "BL-DC", "model": "newest"}], tmp_path / "logs", tmp_path / "run")
+    folder = results.result_folder(tmp_path / "run", record.rows[0].results[0])
+    regions = results.read_region_counts(folder)
+    assert {name: (counts.sum(axis=(1, 2)) > 0).tolist() for name, counts in regions.items()} == {
+        "moving": [True, False],
+        "standing": [True, False],
+    }
+    windows_id = results.read_result(folder).windows_id
+    kept = results.read_arrays(results.windows_file(tmp_path / "run", windows_id), ("actors", "mask"))
+    near = (kept["actors"] == 1) & ~kept["mask"]
+    assert regions["standing"].sum() == near.sum()
+
+
+def with_truth(recording, known):
+    """Give every moment the same truth, the vehicle standing in the map."""
+
+    def moments():
+        for moment in recording.moments():
+            pose = {"pose": dataclasses.replace(known["pose"], stamp_ns=moment.stamp_ns)} if known else {}
+            yield dataclasses.replace(moment, **{**known, **pose})
+
+    return dataclasses.replace(recording, moments=moments)
+
+
 def test_predictions_of_a_perfect_past_are_certain(logs, tmp_path):
     record = run([{"name": "BL-DC", "model": "newest"}], logs, tmp_path / "run")
     folder = results.result_folder(tmp_path / "run", record.rows[0].results[0])
@@ -166,3 +223,10 @@ def test_several_processes_give_the_same_bytes_as_one(logs, tmp_path):
                 first, second = (results.result_folder(tmp_path / run, result_id) / name for run in ("one", "several"))
                 assert first.exists() == second.exists()
                 assert not first.exists() or first.read_bytes() == second.read_bytes()
+
+
+def test_two_logs_of_one_recording_are_refused(tmp_path):
+    for name in ("a", "b"):
+        write_log(street(1, frames=9).recording("twin"), tmp_path / "logs" / f"{name}.mcap")
+    with pytest.raises(InputError, match=r"b\.mcap and a\.mcap both hold twin"):
+        run([{"name": "BL-DC", "model": "newest"}], tmp_path / "logs", tmp_path / "run")
