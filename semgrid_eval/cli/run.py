@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
-from semgrid_eval.executors import available_cores, local_executor
+from semgrid_eval.executors import Executor, available_cores, local_executor
 
 
 @click.command("run", epilog="Example: semgrid-eval run baselines --logs logs --out runs/first")
@@ -22,17 +22,38 @@ from semgrid_eval.executors import available_cores, local_executor
     show_default="all cores",
     help="Logs made into grids at once.",
 )
-def command(matrix: str, logs: Path, out: Path, grids: Path | None, device: str, jobs: int, workers: int) -> int:
+@click.option("--executor", type=click.Choice(["local", "ray"]), default="local", show_default=True)
+@click.option(
+    "--address", default="local", show_default=True, help="Of a running Ray cluster; 'local' starts one here."
+)
+@click.option("--gpus", type=click.FloatRange(0), default=0.0, help="With Ray: GPUs for each row; fractions share one.")
+def command(
+    matrix: str,
+    logs: Path,
+    out: Path,
+    grids: Path | None,
+    device: str,
+    jobs: int,
+    workers: int,
+    executor: str,
+    address: str,
+    gpus: float,
+) -> int:
     """Train and score every row of MATRIX, a YAML file or the name of a preset.
 
     Whatever is finished already is kept: the same command goes on where it was stopped. A row that fails is noted
     with its reason, the others go on, and the exit code is 1.
+
+    Rows can be spread over processes of this machine (--jobs) or over a Ray cluster (--executor ray), whose machines
+    must all reach the folders of logs, grids and the run under the same paths.
     """
     from semgrid_eval.runs.matrix import load_matrix
     from semgrid_eval.runs.runner import RunOptions, run_matrix
 
-    options = RunOptions(device, grids or out / "grids", command_line(), local_executor(jobs), local_executor(workers))
-    record = run_matrix(load_matrix(matrix), logs, out, options, stage=progress)
+    resolved = load_matrix(matrix)
+    rows_on: Executor = local_executor(jobs) if executor == "local" else _ray(address, jobs, gpus)
+    options = RunOptions(device, grids or out / "grids", command_line(), rows_on, local_executor(workers))
+    record = run_matrix(resolved, logs, out, options, stage=progress)
     for row in record.rows:
         if row.failure:
             say(f"Error: row {row.name}: {row.failure}")
@@ -40,3 +61,11 @@ def command(matrix: str, logs: Path, out: Path, grids: Path | None, device: str,
         say(f"Error: {reason}")
     click.echo(out)
     return 1 if record.failed_logs or any(row.failure for row in record.rows) else 0
+
+
+def _ray(address: str, jobs: int, gpus: float) -> Executor:
+    from semgrid_eval.runs.executors import LOCAL, RayExecutor
+
+    if address == LOCAL:
+        return RayExecutor(local_cpus=jobs, gpus=gpus)
+    return RayExecutor(address, gpus=gpus)

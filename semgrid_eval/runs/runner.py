@@ -116,7 +116,8 @@ def _unit_work(
         worker = Worker(out, sources, choose_device(options.device), matrix.seed, stage)
         yield partial(_attempt, worker)
         return
-    place = _Place(matrix.model_dump_json(), logs, out, options.grids, options.device)
+    # Elsewhere the same folder may be another one: paths must not depend on where a process stands.
+    place = _Place(matrix.model_dump_json(), logs.resolve(), out.resolve(), options.grids.resolve(), options.device)
     total = len(plan_units(matrix))
     with stage("rows") as progress:
         progress(0, total)

@@ -32,6 +32,7 @@ class Sources:
     def __init__(
         self, logs: Path, cache: Path, rows: Sequence[Row], *, executor: Executor, device: torch.device, stage: Stage
     ) -> None:
+        self._folder = logs
         self._logs = find_logs(logs)
         self._cache, self._executor, self._device, self._stage = cache, executor, device, stage
         self._sensors: dict[str, list[str]] = {}
@@ -44,7 +45,7 @@ class Sources:
         self._stacked: dict[tuple[str, str], GridData] = {}
         self.failed: dict[str, str] = {}
         self.records: dict[str, LogRecord] = {}
-        self.log_of: dict[str, str] = {}  # by name of the recording
+        self.log_of: dict[str, str] = {}  # path below the folder of logs, by name of the recording
 
     def prepare(self) -> None:
         """Build all grids of the matrix now, as many logs at once as the executor works on."""
@@ -77,12 +78,13 @@ class Sources:
             self._sets[key] = data_set
             self.failed.update(data_set.failed)
             for recording in data_set.recordings:
-                other = self.log_of.setdefault(recording.name, recording.log)
-                if other != recording.log:
-                    raise InputError(f"holds recording {recording.name} like {other}", path=recording.log)
-                self.records[recording.log] = LogRecord(
+                path = str(Path(recording.log).relative_to(self._folder))
+                other = self.log_of.setdefault(recording.name, path)
+                if other != path:
+                    raise InputError(f"{path} and {other} both hold {recording.name}", path=self._folder)
+                self.records[path] = LogRecord(
                     name=Path(recording.log).stem,
-                    path=recording.log,
+                    path=path,
                     digest=recording.digest,
                     split=recording.split,
                     dataset=recording.dataset,

@@ -35,7 +35,7 @@ REGIONS = ("moving", "standing")
 
 
 class LogRecord(Config):
-    """A log that took part in a run."""
+    """A log that took part in a run; its path is below the folder of logs."""
 
     name: str
     path: str

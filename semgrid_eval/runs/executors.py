@@ -1,0 +1,102 @@
+"""Ray as an executor: the same units of work on the machines of a cluster, results written to shared storage."""
+
+import importlib
+import logging
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
+
+from semgrid_eval.errors import InputError, MissingExtraError
+from semgrid_eval.executors import WorkerDied
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+LOCAL = "local"
+CONNECTION_TIMEOUT_S = 5.0
+
+
+class RayExecutor:
+    """Works on a Ray cluster; the folders of logs, grids and the run must be reachable from all its machines.
+
+    Args:
+        address: of a running cluster (`auto` finds the one of this machine), or `local` to start one here.
+        cpus: cores for each piece of work.
+        gpus: GPUs for each piece of work; a fraction lets several share one.
+        local_cpus: cores of a cluster that is started here; all of them if not given.
+
+    Raises:
+        MissingExtraError: Ray is not installed.
+        InputError: the cluster cannot be reached, or never has what a piece of work asks for.
+    """
+
+    def __init__(
+        self, address: str = LOCAL, *, cpus: float = 1.0, gpus: float = 0.0, local_cpus: int | None = None
+    ) -> None:
+        self._ray = _import_ray()
+        self._cpus, self._gpus = cpus, gpus
+        if not self._ray.is_initialized():
+            self._connect(address, local_cpus)
+        resources = self._ray.cluster_resources()
+        for name, needed in (("CPU", cpus), ("GPU", gpus)):
+            if needed > resources.get(name, 0.0):
+                raise InputError(f"has {resources.get(name, 0.0):g} {name}, and a row asks for {needed:g}", field="ray")
+
+    @property
+    def parallel(self) -> int:
+        """How many pieces of work fit on the cluster at once, at least 2: they never run in this process."""
+        return max(2, int(self._ray.cluster_resources().get("CPU", 1.0) / max(self._cpus, 0.01)))
+
+    def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
+        """Yield (index of the item, result) as results come; leaving early cancels what has not begun."""
+        remote = self._ray.remote(num_cpus=self._cpus, num_gpus=self._gpus, max_retries=1)(_apply)
+        pending = {remote.remote(function, item): index for index, item in enumerate(items)}
+        try:
+            while pending:
+                finished, _ = self._ray.wait(list(pending), num_returns=1)
+                index = pending.pop(finished[0])
+                yield index, self._result(finished[0])
+        finally:
+            for reference in pending:
+                self._ray.cancel(reference)
+
+    def close(self) -> None:
+        """Leave the cluster, and stop it if it was started here."""
+        self._ray.shutdown()
+
+    def _result(self, reference: Any) -> Any:  # noqa: ANN401 - Ray is untyped
+        try:
+            return self._ray.get(reference)
+        except (self._ray.exceptions.WorkerCrashedError, self._ray.exceptions.OutOfMemoryError) as error:
+            return WorkerDied(str(error).splitlines()[0])
+
+    def _connect(self, address: str, local_cpus: int | None) -> None:
+        options: dict[str, Any] = {"num_cpus": local_cpus} if address == LOCAL else {"address": address}
+        _check_reachable(address)
+        try:
+            self._ray.init(**options, include_dashboard=False, log_to_driver=False, logging_level=logging.ERROR)
+        except (ConnectionError, RuntimeError, ValueError) as error:
+            raise InputError(f"cannot be reached: {error}", field=f"ray {address}") from error
+
+
+def _apply(function: Callable[[T], R], item: T) -> R:
+    """Call the function: Ray takes plain functions only, no partial ones."""
+    return function(item)
+
+
+def _check_reachable(address: str) -> None:
+    """Ask the port of `host:port` once: Ray itself would go on asking for minutes."""
+    host, separator, port = address.removeprefix("ray://").rpartition(":")
+    if not separator or not port.isdigit():
+        return
+    try:
+        socket.create_connection((host, int(port)), timeout=CONNECTION_TIMEOUT_S).close()
+    except OSError as error:
+        raise InputError(f"cannot be reached: {error}", field=f"ray {address}") from error
+
+
+def _import_ray() -> Any:  # noqa: ANN401 - Ray is untyped and an extra
+    try:
+        return importlib.import_module("ray")
+    except ImportError:
+        raise MissingExtraError("ray", "ray") from None

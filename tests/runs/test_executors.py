@@ -1,0 +1,82 @@
+import os
+
+import numpy as np
+import pytest
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.executors import InProcess, Processes, WorkerDied, local_executor
+
+ray = pytest.importorskip("ray", reason="the extra 'ray' is not installed")
+
+
+def square_or_die(value):
+    if value == 3:
+        os._exit(1)
+    return value * value, os.getpid()
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    from semgrid_eval.runs.executors import RayExecutor
+
+    executor = RayExecutor(local_cpus=2)
+    yield executor
+    executor.close()
+
+
+def test_one_worker_means_this_process():
+    assert isinstance(local_executor(1), InProcess)
+    assert [index for index, _ in InProcess().run(abs, [-1, -2])] == [0, 1]
+
+
+def test_processes_give_every_result_and_name_a_death():
+    results = dict(Processes(2).run(square_or_die, [1, 2]))
+    assert {index: value for index, (value, _) in results.items()} == {0: 1, 1: 4}
+    assert all(pid != os.getpid() for _, pid in results.values())
+    assert WorkerDied() in dict(Processes(2).run(square_or_die, [3])).values()
+
+
+def test_a_ray_cluster_gives_every_result_and_names_a_death(cluster):
+    results = dict(cluster.run(square_or_die, [1, 2, 3, 4]))
+    assert [results[i][0] for i in (0, 1, 3)] == [1, 4, 16]
+    assert isinstance(results[2], WorkerDied)
+    assert cluster.parallel == 2
+
+
+def test_a_cluster_that_is_too_small_or_absent_is_one_line(cluster):
+    from semgrid_eval.runs.executors import RayExecutor
+
+    with pytest.raises(InputError, match="ray: has 2 CPU, and a row asks for 64"):
+        RayExecutor(cpus=64)
+    cluster.close()
+    with pytest.raises(InputError, match=r"ray 127\.0\.0\.1:9: cannot be reached"):
+        RayExecutor("127.0.0.1:9")
+
+
+def test_ray_gives_the_same_bytes_as_this_process(tmp_path):
+    from support.toy_world import street
+
+    from semgrid_eval.log.store import write_log
+    from semgrid_eval.runs.executors import RayExecutor
+    from semgrid_eval.runs.matrix import load_matrix
+    from semgrid_eval.runs.runner import RunOptions, run_matrix
+    from semgrid_eval.scores import results
+
+    for i, split in enumerate(("train", "val")):
+        write_log(street(i, frames=9).recording(f"toy{i}", split), tmp_path / "logs" / f"toy{i}.mcap")
+    (tmp_path / "m.yaml").write_text(
+        "defaults: {window: {step_frames: 3, target_frame: 8}, network: {features: 4, depth: 2},\n"
+        "  training: {epochs: 1, updates_per_epoch: 2, batch: 2, precision: float32}}\n"
+        "rows:\n- {name: BL-DC, model: newest}\n- {name: ED-DC, model: ed}\n"
+    )
+    matrix = load_matrix(str(tmp_path / "m.yaml"))
+    counts = {}
+    executor = RayExecutor(local_cpus=2)
+    for name, rows_on in (("here", InProcess()), ("ray", executor)):
+        options = RunOptions("cpu", tmp_path / "grids", "test", rows_on)
+        record = run_matrix(matrix, tmp_path / "logs", tmp_path / name, options)
+        assert [row.failure for row in record.rows] == [None, None]
+        counts[name] = [results.read_counts(results.result_folder(tmp_path / name, r.results[0])) for r in record.rows]
+    executor.close()
+    for here, there in zip(*counts.values(), strict=True):
+        np.testing.assert_array_equal(here, there)
