@@ -83,7 +83,7 @@ def test_sensors_are_overlaid_before_anything_is_looked_for(count):
 STAYS = {
     "a motion within the rounding": (with_box(road(), 12, 8), with_box(road(), 11, 8), {"least_motion_cells": 1.0}),
     "a jump faster than the limit": (with_box(road(), 19, 8), with_box(road(), 8, 8), {"speed_limit_mps": 40.0}),
-    "a person faster than a cyclist": (
+    "a person where only vehicles are to move": (
         with_box(road(), 14, 8, PERSON, 2, 2),
         with_box(road(), 11, 8, PERSON, 2, 2),
         {"small_speed_limit_mps": 10.0},
