@@ -1,5 +1,6 @@
 """How a car moves and what it reports: the path of its rear axle, its speed and its yaw rate."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,13 +78,8 @@ def drive(
         return None
     step_s = float(times_s[1] - times_s[0])
     front = _smoothed(front_m, SMOOTHING_S / step_s)
-    rear = np.empty_like(front)
-    rear[0] = front[0] - FRONT_TO_REAR_AXLE_M * np.array([np.cos(heading_rad[0]), np.sin(heading_rad[0])])
-    for index in range(1, len(front)):
-        back = rear[index - 1] - front[index]
-        rear[index] = front[index] + FRONT_TO_REAR_AXLE_M * back / np.linalg.norm(back)
-    ahead = front - rear
-    yaw = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+    yaw = _followed_yaw(front, float(heading_rad[0]))
+    rear = front - FRONT_TO_REAR_AXLE_M * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
     velocity = np.gradient(rear, step_s, axis=0)
     speed = velocity[:, 0] * np.cos(yaw) + velocity[:, 1] * np.sin(yaw)
     return Trajectory(times_s, rear, yaw, speed, np.gradient(yaw, step_s))
@@ -99,6 +95,20 @@ def report(
     errors = rng.standard_normal((len(times_s), 2)) * (noise.speed_mps, noise.yaw_rate_radps)
     moving = np.abs(speed) > 0.05  # a wheel that stands reports exactly nothing
     return np.stack([np.where(moving, speed + errors[:, 0], 0.0), yaw_rate + errors[:, 1]], axis=1)
+
+
+def _followed_yaw(front_m: NDArray[np.float64], yaw_rad: float) -> NDArray[np.float64]:
+    """Return the heading (S,) of a vehicle whose front is led along points (S, 2) and whose rear axle follows.
+
+    Along a straight step s the angle phi between heading and step shrinks as tan(phi / 2) exp(-s / L): the tractrix.
+    """
+    yaws = [yaw_rad]
+    for step_x, step_y in np.diff(front_m, axis=0).tolist():
+        way = math.atan2(step_y, step_x)
+        slip = math.remainder(yaws[-1] - way, math.tau)
+        shrunk = 2.0 * math.atan(math.tan(slip / 2.0) * math.exp(-math.hypot(step_x, step_y) / FRONT_TO_REAR_AXLE_M))
+        yaws.append(yaws[-1] + shrunk - slip)
+    return np.array(yaws)
 
 
 def _smoothed(points: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
