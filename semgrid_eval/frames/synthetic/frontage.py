@@ -10,7 +10,7 @@ from semgrid_eval.frames.synthetic.ground import CELL_M, Ground, Surface
 from semgrid_eval.frames.synthetic.kinds import TownKind
 from semgrid_eval.frames.synthetic.network import Lane, LaneUse, Network
 from semgrid_eval.frames.synthetic.polyline import Polyline
-from semgrid_eval.frames.synthetic.solids import BoxRow, Texture, box
+from semgrid_eval.frames.synthetic.solids import BoxRow, Look, Texture, box
 from semgrid_eval.frames.synthetic.trees import Tree, draw_bush, draw_tree
 
 _BUILDING, _WALL, _FENCE, _HEDGE = (LABEL_ID[name] for name in ("building", "wall", "fence", "vegetation"))
@@ -31,14 +31,6 @@ _ROOFS = ((110, 62, 52), (74, 72, 74), (96, 84, 76), (60, 62, 68))
 _TOLERANCE_M = 0.8  # by which houses of a bent row may overlap, and their facades touch the sidewalk
 _OCCUPANCY_STEP = 2  # ground cells a cell of the map of what is taken
 _OCCUPANCY_M = CELL_M * _OCCUPANCY_STEP
-
-
-@dataclass
-class Frontage:
-    """What has been put up so far."""
-
-    boxes: list[BoxRow]
-    trees: list[Tree]
 
 
 class Plots:
@@ -67,144 +59,129 @@ class Plots:
         return True
 
 
-def line_streets(network: Network, kind: TownKind, plots: Plots, rng: np.random.Generator) -> Frontage:
-    """Put parcels along the outer side of every sidewalk, building or open, and fill what lies behind."""
-    frontage = Frontage([], [])
-    for lane in network.lanes:
-        if lane.use is LaneUse.SIDEWALK:
-            _line_sidewalk(lane, kind, plots, rng, frontage)
-    _fill_behind(network, kind, plots, rng, frontage)
-    return frontage
+@dataclass(frozen=True)
+class _Parcel:
+    """A piece of a street's outer side: from where to where along the line, and where the sidewalk ends left of it."""
+
+    line: Polyline
+    start_m: float
+    width_m: float
+    edge_m: float
+
+    @property
+    def end_m(self) -> float:
+        return self.start_m + self.width_m
 
 
-def _line_sidewalk(lane: Lane, kind: TownKind, plots: Plots, rng: np.random.Generator, frontage: Frontage) -> None:
-    line = Polyline.through(lane.line_m)
-    setback_m = float(rng.uniform(*kind.setback_m))
-    edge_m = -lane.width_m / 2.0  # left of the sidewalk's middle
-    s_m = -6.0  # parcels reach round the corner
-    while s_m < line.length_m + 4.0:
-        width_m = float(rng.uniform(*kind.parcel_m))
-        is_built = rng.random() < kind.frontage
-        built = is_built and _build_house(line, s_m, width_m, edge_m - setback_m, kind, plots, rng, frontage)
-        if setback_m > 2.0 or not built:
-            _close_front(line, (s_m, s_m + width_m), edge_m - 0.3, kind, plots, rng, frontage)
-        if not built:
-            _plant(line, s_m, width_m, edge_m, plots, rng, frontage)
-        s_m += width_m + (float(rng.uniform(2.0, 8.0)) if rng.random() < 0.2 or kind.floors[0] == 1 else 0.15)
+class Frontage:
+    """Puts up what lines the streets of a town; `boxes` and `trees` are what stands so far."""
 
+    def __init__(self, kind: TownKind, plots: Plots, rng: np.random.Generator) -> None:
+        self.boxes: list[BoxRow] = []
+        self.trees: list[Tree] = []
+        self._kind = kind
+        self._plots = plots
+        self._rng = rng
 
-def _build_house(
-    line: Polyline,
-    s_m: float,
-    width_m: float,
-    front_m: float,
-    kind: TownKind,
-    plots: Plots,
-    rng: np.random.Generator,
-    frontage: Frontage,
-) -> bool:
-    """Put a house up with its facade `front_m` left of the line (negative: right); say whether there was room."""
-    depth_m = float(rng.uniform(9.0, 15.0))
-    recess_m = float(rng.choice([0.0, 0.0, 0.4, 1.0]))
-    x_m, y_m, yaw_rad = line.at(s_m + width_m / 2.0, front_m - recess_m - depth_m / 2.0)
-    if not plots.take(x_m, y_m, yaw_rad, (width_m - 2.0 * _TOLERANCE_M, depth_m - 2.0 * _TOLERANCE_M)):
-        return False
-    floors = int(rng.integers(kind.floors[0], kind.floors[1] + 1))
-    height_m = floors * _FLOOR_M + float(rng.uniform(0.3, 1.6))
-    facade = (_BUILDING, Texture.FACADE, _FACADES[int(rng.integers(len(_FACADES)))])
-    roof = (_BUILDING, Texture.ROOF, _ROOFS[int(rng.integers(len(_ROOFS)))])
-    frontage.boxes.append(box((x_m, y_m, yaw_rad), (0.0, height_m), (width_m, depth_m), facade))
-    ridge_m = float(rng.uniform(1.5, 4.5))
-    top = (width_m * float(rng.choice([0.6, 0.99])), depth_m * 0.15)
-    eaves = (width_m + 0.1, depth_m + 0.7)
-    frontage.boxes.append(box((x_m, y_m, yaw_rad), (height_m - 0.02, height_m + ridge_m), eaves, roof, top_size_m=top))
-    _add_relief(line, (s_m, s_m + width_m), front_m - recess_m, height_m, facade, rng, frontage)
-    return True
+    def line_streets(self, network: Network) -> None:
+        """Put parcels along the outer side of every sidewalk, building or open, and fill what lies behind."""
+        for lane in network.lanes:
+            if lane.use is LaneUse.SIDEWALK:
+                self._line_sidewalk(lane)
+        self._fill_behind(network)
 
+    def _line_sidewalk(self, lane: Lane) -> None:
+        line, kind = Polyline.through(lane.line_m), self._kind
+        setback_m = self._between(*kind.setback_m)
+        start_m = -6.0  # parcels reach round the corner
+        while start_m < line.length_m + 4.0:
+            parcel = _Parcel(line, start_m, self._between(*kind.parcel_m), -lane.width_m / 2.0)
+            built = self._rng.random() < kind.frontage and self._build_house(parcel, setback_m)
+            if setback_m > 2.0 or not built:
+                self._close_front(parcel)
+            if not built:
+                self._plant(parcel)
+            has_gap = self._rng.random() < 0.2 or kind.floors[0] == 1
+            start_m = parcel.end_m + (self._between(2.0, 8.0) if has_gap else 0.15)
 
-def _add_relief(
-    line: Polyline,
-    span_m: tuple[float, float],
-    front_m: float,
-    height_m: float,
-    look: tuple[int, int, tuple[int, int, int]],
-    rng: np.random.Generator,
-    frontage: Frontage,
-) -> None:
-    """Break a facade's plane: bays and balconies above the ground floor, a porch or steps below."""
-    for _ in range(int(rng.integers(0, 4))):
-        depth_m, width_m = float(rng.uniform(0.5, 1.3)), float(rng.uniform(1.6, 3.2))
-        s_m = float(rng.uniform(span_m[0] + 2.0, span_m[1] - 2.0))
-        place = line.at(s_m, front_m + depth_m / 2.0 - 0.05)
-        if height_m > 2.0 * _FLOOR_M and rng.random() < 0.75:
-            top_m = float(rng.uniform(_FLOOR_M + 2.0, height_m - 0.5))
-            frontage.boxes.append(box(place, (_FLOOR_M + 0.2, top_m), (width_m, depth_m), look))
-        elif front_m < -4.0:
-            frontage.boxes.append(box(place, (0.0, float(rng.uniform(0.4, 2.7))), (width_m, depth_m), look))
+    def _build_house(self, parcel: _Parcel, setback_m: float) -> bool:
+        """Put a house up and say whether there was room."""
+        depth_m, width_m = self._between(9.0, 15.0), parcel.width_m
+        front_m = parcel.edge_m - setback_m - float(self._rng.choice([0.0, 0.0, 0.4, 1.0]))
+        place = parcel.line.at(parcel.start_m + width_m / 2.0, front_m - depth_m / 2.0)
+        if not self._plots.take(*place, (width_m - 2.0 * _TOLERANCE_M, depth_m - 2.0 * _TOLERANCE_M)):
+            return False
+        floors = int(self._rng.integers(self._kind.floors[0], self._kind.floors[1] + 1))
+        height_m = floors * _FLOOR_M + self._between(0.3, 1.6)
+        facade = (_BUILDING, Texture.FACADE, _FACADES[int(self._rng.integers(len(_FACADES)))])
+        roof = (_BUILDING, Texture.ROOF, _ROOFS[int(self._rng.integers(len(_ROOFS)))])
+        self.boxes.append(box(place, (0.0, height_m), (width_m, depth_m), facade))
+        ridge_m = height_m + self._between(1.5, 4.5)
+        top = (width_m * float(self._rng.choice([0.6, 0.99])), depth_m * 0.15)
+        eaves = (width_m + 0.1, depth_m + 0.7)
+        self.boxes.append(box(place, (height_m - 0.02, ridge_m), eaves, roof, top_size_m=top))
+        self._add_relief(parcel, front_m, height_m, facade)
+        return True
 
+    def _add_relief(self, parcel: _Parcel, front_m: float, height_m: float, look: Look) -> None:
+        """Break a facade's plane: bays and balconies above the ground floor, a porch or steps below."""
+        for _ in range(int(self._rng.integers(0, 4))):
+            size_m = (self._between(0.5, 1.3), self._between(1.6, 3.2))[::-1]  # width along the street, then depth
+            along_m = self._between(parcel.start_m + 2.0, parcel.end_m - 2.0)
+            place = parcel.line.at(along_m, front_m + size_m[1] / 2.0 - 0.05)
+            if height_m > 2.0 * _FLOOR_M and self._rng.random() < 0.75:
+                heights_m = (_FLOOR_M + 0.2, self._between(_FLOOR_M + 2.0, height_m - 0.5))
+                self.boxes.append(box(place, heights_m, size_m, look))
+            elif front_m < -4.0:
+                self.boxes.append(box(place, (0.0, self._between(0.4, 2.7)), size_m, look))
 
-def _close_front(
-    line: Polyline,
-    span_m: tuple[float, float],
-    left_m: float,
-    kind: TownKind,
-    plots: Plots,
-    rng: np.random.Generator,
-    frontage: Frontage,
-) -> None:
-    """Close a parcel towards the sidewalk with a hedge, a wall or a fence, or leave it open; gates stay open."""
-    drawn = rng.random()
-    if drawn > kind.hedges + kind.fences:
-        return
-    start_m, end_m = max(span_m[0], 0.0), min(span_m[1] - float(rng.uniform(1.2, 3.5)), line.length_m)
-    if drawn < kind.hedges:
-        thickness_m, height_m, look = (
-            float(rng.uniform(0.6, 1.2)),
-            float(rng.uniform(0.8, 2.0)),
-            (_HEDGE, Texture.FOLIAGE, (66, 88, 46)),
-        )
-    elif rng.random() < 0.5:
-        thickness_m, height_m, look = 0.3, float(rng.uniform(0.7, 2.0)), (_WALL, Texture.ROOF, (150, 138, 124))
-    else:
-        thickness_m, height_m, look = 0.12, float(rng.uniform(0.9, 1.8)), (_FENCE, Texture.PLANKS, (120, 98, 74))
-    for s_m in np.arange(start_m, end_m, 5.0):
-        length_m = min(5.0, end_m - float(s_m))
-        x_m, y_m, yaw_rad = line.at(float(s_m) + length_m / 2.0, left_m - thickness_m / 2.0)
-        if length_m > 0.5 and plots.take(x_m, y_m, yaw_rad, (length_m - 0.4, thickness_m)):
-            frontage.boxes.append(box((x_m, y_m, yaw_rad), (0.0, height_m), (length_m, thickness_m), look))
+    def _close_front(self, parcel: _Parcel) -> None:
+        """Close a parcel towards the sidewalk with a hedge, a wall or a fence, or leave it open; gates stay open."""
+        drawn = self._rng.random()
+        if drawn > self._kind.hedges + self._kind.fences:
+            return
+        line, start_m = parcel.line, max(parcel.start_m, 0.0)
+        end_m = min(parcel.end_m - self._between(1.2, 3.5), line.length_m)
+        thickness_m, height_m, look = self._draw_closure(is_hedge=drawn < self._kind.hedges)
+        for along_m in np.arange(start_m, end_m, 5.0).tolist():
+            length_m = min(5.0, end_m - along_m)
+            place = line.at(along_m + length_m / 2.0, parcel.edge_m - 0.3 - thickness_m / 2.0)
+            if length_m > 0.5 and self._plots.take(*place, (length_m - 0.4, thickness_m)):
+                self.boxes.append(box(place, (0.0, height_m), (length_m, thickness_m), look))
 
+    def _draw_closure(self, *, is_hedge: bool) -> tuple[float, float, Look]:
+        """Draw thickness, height and look of a hedge, or of a wall or fence."""
+        if is_hedge:
+            return self._between(0.6, 1.2), self._between(0.8, 2.0), (_HEDGE, Texture.FOLIAGE, (66, 88, 46))
+        if self._rng.random() < 0.5:
+            return 0.3, self._between(0.7, 2.0), (_WALL, Texture.ROOF, (150, 138, 124))
+        return 0.12, self._between(0.9, 1.8), (_FENCE, Texture.PLANKS, (120, 98, 74))
 
-def _plant(
-    line: Polyline,
-    s_m: float,
-    width_m: float,
-    edge_m: float,
-    plots: Plots,
-    rng: np.random.Generator,
-    frontage: Frontage,
-) -> None:
-    """Put trees and bushes on an open parcel."""
-    for _ in range(int(rng.integers(1, 5))):
-        place = line.at(s_m + float(rng.uniform(0.0, width_m)), edge_m - float(rng.uniform(2.0, 14.0)))
-        if plots.take(*place, (1.5, 1.5)):
-            is_tree = rng.random() < 0.6
-            tree = draw_tree(place[0], place[1], 1.3, rng) if is_tree else draw_bush(place[0], place[1], rng)
-            frontage.trees.append(tree)
+    def _plant(self, parcel: _Parcel) -> None:
+        """Put trees and bushes on an open parcel."""
+        for _ in range(int(self._rng.integers(1, 5))):
+            along_m = parcel.start_m + self._between(0.0, parcel.width_m)
+            place = parcel.line.at(along_m, parcel.edge_m - self._between(2.0, 14.0))
+            if self._plots.take(*place, (1.5, 1.5)):
+                is_tree = self._rng.random() < 0.6
+                x_m, y_m, _ = place
+                self.trees.append(draw_tree(x_m, y_m, 1.3, self._rng) if is_tree else draw_bush(x_m, y_m, self._rng))
 
+    def _fill_behind(self, network: Network) -> None:
+        """Scatter houses and trees over the blocks and around the town, so that no gap shows an empty plain."""
+        west_m, south_m, east_m, north_m = network.bounds_m()
+        area_ha = (east_m - west_m + 120.0) * (north_m - south_m + 120.0) / 1e4
+        for _ in range(round(area_ha * 14)):
+            x_m, y_m = self._between(west_m - 60, east_m + 60), self._between(south_m - 60, north_m + 60)
+            yaw_rad = self._between(-np.pi, np.pi)
+            size_m = (self._between(8.0, 18.0), self._between(7.0, 12.0))
+            if self._rng.random() < 0.6 * self._kind.frontage:
+                if self._plots.take(x_m, y_m, yaw_rad, (size_m[0] + 3.0, size_m[1] + 3.0)):
+                    look = (_BUILDING, Texture.FACADE, _FACADES[int(self._rng.integers(len(_FACADES)))])
+                    height_m = float(self._rng.integers(1, self._kind.floors[1] + 1)) * _FLOOR_M + 0.5
+                    self.boxes.append(box((x_m, y_m, yaw_rad), (0.0, height_m), size_m, look))
+            elif self._plots.take(x_m, y_m, 0.0, (2.0, 2.0)):
+                self.trees.append(draw_tree(x_m, y_m, 1.5, self._rng))
 
-def _fill_behind(network: Network, kind: TownKind, plots: Plots, rng: np.random.Generator, frontage: Frontage) -> None:
-    """Scatter houses and trees over the blocks and around the town, so that no gap shows an empty plain."""
-    west_m, south_m, east_m, north_m = network.bounds_m()
-    area_ha = (east_m - west_m + 120.0) * (north_m - south_m + 120.0) / 1e4
-    for _ in range(round(area_ha * 14)):
-        x_m, y_m = float(rng.uniform(west_m - 60, east_m + 60)), float(rng.uniform(south_m - 60, north_m + 60))
-        yaw_rad = float(rng.uniform(-np.pi, np.pi))
-        size_m = (float(rng.uniform(8.0, 18.0)), float(rng.uniform(7.0, 12.0)))
-        if rng.random() < 0.6 * kind.frontage:
-            clear_m = (size_m[0] + 3.0, size_m[1] + 3.0)
-            if plots.take(x_m, y_m, yaw_rad, clear_m):
-                look = (_BUILDING, Texture.FACADE, _FACADES[int(rng.integers(len(_FACADES)))])
-                height_m = float(rng.integers(1, kind.floors[1] + 1)) * _FLOOR_M + 0.5
-                frontage.boxes.append(box((x_m, y_m, yaw_rad), (0.0, height_m), size_m, look))
-        elif plots.take(x_m, y_m, 0.0, (2.0, 2.0)):
-            frontage.trees.append(draw_tree(x_m, y_m, 1.5, rng))
+    def _between(self, low: float, high: float) -> float:
+        return float(self._rng.uniform(low, high))

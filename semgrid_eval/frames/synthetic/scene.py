@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.frames.synthetic.bodies import boxes_of
-from semgrid_eval.frames.synthetic.frontage import Plots, line_streets
+from semgrid_eval.frames.synthetic.frontage import Frontage, Plots
 from semgrid_eval.frames.synthetic.furniture import furnish_streets, park_cars
 from semgrid_eval.frames.synthetic.ground import Ground, GroundPainter, paint_streets
 from semgrid_eval.frames.synthetic.kinds import TownKind
@@ -62,7 +62,8 @@ def build_scene(network: Network, kind: TownKind, rng: np.random.Generator) -> S
     places = np.array([car[1:] for car in cars], np.float64).reshape(-1, 3)
     parked = _standing(np.array([car[0] for car in cars], np.uint8), places[:, :2], places[:, 2])
     furniture, trees = furnish_streets(network, kind, rng)
-    frontage = line_streets(network, kind, Plots(ground), rng)
+    frontage = Frontage(kind, Plots(ground), rng)
+    frontage.line_streets(network)
     boxes = np.concatenate([np.array(furniture + frontage.boxes, BOX), boxes_of(parked, 0.0)])
     return Scene(ground, Soup.joined([soup_of_boxes(boxes), soup_of_trees(trees + frontage.trees, rng)]), parked)
 

@@ -37,6 +37,8 @@ BOX = np.dtype(
         ("colour", "u1", (3,)),
     ]
 )
+Look = tuple[int, int, tuple[int, int, int]]
+"""Cityscapes label id, texture and sRGB colour."""
 BoxRow = tuple[
     float, float, float, float, float, float, float, float, float, float, int, int, int, tuple[int, int, int]
 ]
@@ -64,7 +66,7 @@ def box(
     place: tuple[float, float, float],
     heights_m: tuple[float, float],
     size_m: tuple[float, float],
-    look: tuple[int, int, tuple[int, int, int]],
+    look: Look,
     *,
     top_size_m: tuple[float, float] | None = None,
     instance: int = 0,
