@@ -1,13 +1,13 @@
 """`semgrid-eval convert`: bring recordings into the form of logs."""
 
 import importlib
-import os
 from pathlib import Path
 
 import click
 
 from semgrid_eval.cli.console import progress, say
 from semgrid_eval.errors import MissingExtraError
+from semgrid_eval.executors import available_cores, local_executor
 from semgrid_eval.frames.cityscapes import CAMERA_NAME, find_sequences
 from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
 
@@ -75,7 +75,7 @@ def command() -> None:
 @click.option(
     "--workers",
     type=click.IntRange(1, 256),
-    default=os.cpu_count() or 1,
+    default=available_cores(),
     show_default="all cores",
     help="Logs at once.",
 )
@@ -104,5 +104,5 @@ def cityscapes(
     sequences = find_sequences(src, splits=splits, labels=labels, train_ids=train_ids, camera_name=camera_name)
     jobs = [ConversionJob(name=s.name, split=s.split, digest=s.digest, load=s.recording) for s in sequences]
     with progress("convert") as watch:
-        summary = convert_recordings(jobs, out, workers=workers, progress=watch)
+        summary = convert_recordings(jobs, out, executor=local_executor(workers), progress=watch)
     return show(summary, out)

@@ -1,6 +1,5 @@
 """`semgrid-eval convert synthetic`: simulated traffic seen by a simulated stereo camera, as logs."""
 
-import os
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -10,6 +9,7 @@ import click
 
 from semgrid_eval.cli.console import progress
 from semgrid_eval.config import parse_config
+from semgrid_eval.executors import available_cores, local_executor
 from semgrid_eval.frames.synthetic.recordings import SyntheticConfig, plan_recordings, render_recording
 from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
 
@@ -37,7 +37,7 @@ def convert(out: Path, *, workers: int, cache: Path | None = None, **options: An
         plans = plan_recordings(config, cache or out / _CACHE, watch, workers=workers)
     jobs = [ConversionJob(plan.name, plan.split, plan.digest, partial(render_recording, plan)) for plan in plans]
     with progress("render") as watch:
-        return convert_recordings(jobs, out, workers=workers, progress=watch)
+        return convert_recordings(jobs, out, executor=local_executor(workers), progress=watch)
 
 
 def _option(name: str, kind: "type | click.Choice[str]", text: str) -> Callable[[_Command], _Command]:
@@ -65,7 +65,7 @@ def _option(name: str, kind: "type | click.Choice[str]", text: str) -> Callable[
     "--cache", type=click.Path(path_type=Path, file_okay=False), help="Folder of towns.  [default: OUT/.towns]"
 )
 @click.option(
-    "--workers", type=click.IntRange(1, 256), default=os.cpu_count() or 1, show_default="all cores", help="Processes."
+    "--workers", type=click.IntRange(1, 256), default=available_cores(), show_default="all cores", help="Processes."
 )
 def synthetic(out: Path, workers: int, cache: Path | None, **options: Any) -> int:  # noqa: ANN401
     """Simulate towns and drive through them: logs OUT/<split>/town<NN>_<recording>_000000.mcap.

@@ -9,11 +9,13 @@ from semgrid_eval.cli.console import command_line, progress, say
 from semgrid_eval.executors import available_cores, local_executor
 
 PRESET = "demo"
+TOWNS = 8
+"""Two of each kind, so that training has seen every kind that validation holds."""
 
 
 @click.command("demo", epilog="Example: semgrid-eval demo --out demo")
 @click.option("--out", default="demo", show_default=True, type=click.Path(path_type=Path, file_okay=False))
-@click.option("--recordings", type=click.IntRange(4, 10_000), default=80, show_default=True, help="Drives to simulate.")
+@click.option("--recordings", type=click.IntRange(4, 10_000), default=96, show_default=True, help="Drives to simulate.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
 @click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 @click.option(
@@ -35,7 +37,7 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
 
     start_s = time.monotonic()
     logs, run = out / "logs", out / "run"
-    summary = convert(logs, recordings=recordings, seed=seed, workers=workers)
+    summary = convert(logs, recordings=recordings, seed=seed, towns=TOWNS, workers=workers)
     options = RunOptions(device, out / "grids", command_line(), grid_executor=local_executor(workers))
     record = run_matrix(load_matrix(PRESET), logs, run, options, stage=progress)
     page = write_report(run)

@@ -1,14 +1,12 @@
 """Convert recordings to logs, several at once: what is done is skipped, what fails is named, the rest goes on."""
 
-import multiprocessing
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from semgrid_eval.errors import InputError, LogError, SemgridError
+from semgrid_eval.executors import Executor, WorkerDied
 from semgrid_eval.frames.types import Recording
 from semgrid_eval.log.store import SUFFIX, LogReader, write_log
 from semgrid_eval.progress import Progress
@@ -46,7 +44,7 @@ class ConversionSummary:
 
 
 def convert_recordings(
-    jobs: Sequence[ConversionJob], out: Path, *, workers: int, progress: Progress
+    jobs: Sequence[ConversionJob], out: Path, *, executor: Executor, progress: Progress
 ) -> ConversionSummary:
     """Write the log OUT/<split>/<name>.mcap of each recording.
 
@@ -56,7 +54,7 @@ def convert_recordings(
     Args:
         jobs: the recordings.
         out: the folder of all logs.
-        workers: how many processes convert at once; 1 converts in this one.
+        executor: where recordings are converted.
         progress: told after each recording.
 
     Raises:
@@ -64,8 +62,11 @@ def convert_recordings(
     """
     _refuse_duplicates(jobs)
     summary = ConversionSummary()
-    for done, (job, outcome) in enumerate(_outcomes(jobs, out, workers), start=1):
-        if outcome.failure is not None:
+    for done, (index, outcome) in enumerate(executor.run(partial(_convert, out=out), jobs), start=1):
+        job = jobs[index]
+        if isinstance(outcome, WorkerDied):
+            summary.failed[job.label] = outcome.reason
+        elif outcome.failure is not None:
             summary.failed[job.label] = outcome.failure
         else:
             (summary.written if outcome.written else summary.skipped).append(job.label)
@@ -80,29 +81,6 @@ def convert_recordings(
 class _Outcome:
     written: bool
     failure: str | None = None
-
-
-def _outcomes(jobs: Sequence[ConversionJob], out: Path, workers: int) -> Iterator[tuple[ConversionJob, _Outcome]]:
-    if min(workers, len(jobs)) <= 1:
-        for job in jobs:
-            yield job, _convert(job, out)
-        return
-    # Fresh processes: a fork would copy whatever threads and locks the caller holds.
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context, initializer=_ignore_interrupt)
-    try:
-        futures = {pool.submit(_convert, job, out): job for job in jobs}
-        for future in as_completed(futures):
-            yield futures[future], _result(future)
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _result(future: Future[_Outcome]) -> _Outcome:
-    try:
-        return future.result()
-    except BrokenProcessPool:
-        return _Outcome(written=False, failure="a worker process was killed (out of memory?)")
 
 
 def _convert(job: ConversionJob, out: Path) -> _Outcome:
@@ -137,8 +115,3 @@ def _refuse_duplicates(jobs: Sequence[ConversionJob]) -> None:
         if job.label in seen:
             raise InputError("two recordings have this name", field=job.label)
         seen.add(job.label)
-
-
-def _ignore_interrupt() -> None:
-    """Let Ctrl-C stop the parent alone: it drops what waits, and what is being written is finished."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

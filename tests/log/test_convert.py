@@ -6,6 +6,7 @@ import pytest
 from support.driving import driving
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.executors import local_executor
 from semgrid_eval.log.convert import ConversionJob, convert_recordings
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.progress import silent
@@ -24,7 +25,7 @@ def job(name, load=driving, digest="d" * 16):
 
 
 def convert(jobs, out, workers=1):
-    return convert_recordings(jobs, out, workers=workers, progress=silent)
+    return convert_recordings(jobs, out, executor=local_executor(workers), progress=silent)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -88,7 +89,7 @@ def test_interrupted_conversion_leaves_whole_logs_and_goes_on_from_there(tmp_pat
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        convert_recordings(jobs, tmp_path, workers=workers, progress=interrupt)
+        convert_recordings(jobs, tmp_path, executor=local_executor(workers), progress=interrupt)
     left = [f"val/{path.stem}" for path in sorted((tmp_path / "val").iterdir())]
     assert left if workers == 2 else left == ["val/a"]  # other processes finish what they have begun
     summary = convert(jobs, tmp_path)
@@ -99,7 +100,7 @@ def test_interrupted_conversion_leaves_whole_logs_and_goes_on_from_there(tmp_pat
 def test_progress_names_every_recording_once(tmp_path):
     told = []
     jobs = [job("a"), job("b", partial(refuse, "is missing"))]
-    convert_recordings(jobs, tmp_path, workers=1, progress=lambda *call: told.append(call))
+    convert_recordings(jobs, tmp_path, executor=local_executor(1), progress=lambda *call: told.append(call))
     assert told == [(1, 2, "val/a"), (2, 2, "val/b")]
 
 
