@@ -119,15 +119,14 @@ def pose_message(pose: Pose, frame_id: str) -> PoseInFrame:
 
 
 def read_pose(data: bytes) -> Pose:
-    """Read a planar pose; its yaw comes back within rounding, between minus and plus pi.
+    """Read a planar pose; its yaw comes back within rounding, but for whole double turns, and gives the same message.
 
     Raises:
         DecodeError: the message is damaged.
     """
     message = PoseInFrame.FromString(data)
-    position, turn = message.pose.position, message.pose.orientation
-    yaw_rad = math.remainder(2 * math.atan2(turn.z, turn.w), 2 * math.pi)
-    return Pose(stamp_ns(message.timestamp), position.x, position.y, yaw_rad)
+    position = message.pose.position
+    return Pose(stamp_ns(message.timestamp), position.x, position.y, _yaw_rad(message.pose.orientation))
 
 
 def actors_message(stamp_ns: int, actors: tuple[Actor, ...]) -> Actors:
@@ -174,7 +173,15 @@ def _transform(
 
 
 def _turned_by(yaw_rad: float) -> Quaternion:
-    return Quaternion(x=0.0, y=0.0, z=math.sin(yaw_rad / 2), w=math.cos(yaw_rad / 2))
+    half_rad = math.remainder(yaw_rad / 2, math.tau)  # nothing but rounding depends on whole turns of the quaternion
+    return Quaternion(x=0.0, y=0.0, z=math.sin(half_rad), w=math.cos(half_rad))
+
+
+def _yaw_rad(turn: Quaternion) -> float:
+    """Undo `_turned_by`: of the angle found and its two neighbours, take the one that gives these very numbers."""
+    found = 2 * math.atan2(turn.z, turn.w)
+    near = (found, math.nextafter(found, -math.inf), math.nextafter(found, math.inf))
+    return next((yaw for yaw in near if (math.sin(yaw / 2), math.cos(yaw / 2)) == (turn.z, turn.w)), found)
 
 
 def _ego_from_optical_rotation(calibration: CameraCalibration) -> Quaternion:

@@ -17,6 +17,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
+    Attachment,
     AttachmentIndex,
     Channel,
     Chunk,
@@ -128,6 +129,25 @@ class Container:
             body = self._record(Opcode.METADATA, found[0].offset, found[0].length)
             record: Metadata = Metadata.read(ReadDataStream(io.BytesIO(body)))
             return record.metadata
+
+    def attachments(self) -> dict[str, bytes]:
+        """Return the attached files by name.
+
+        Raises:
+            LogError: an attachment is damaged, or two have one name.
+        """
+        found: dict[str, bytes] = {}
+        for index in self.summary.attachment_indexes:
+            with damage_as_log_error(self.path):
+                if index.name in found:
+                    raise McapError(f"two attachments are called {index.name!r}")
+                body = self._record(Opcode.ATTACHMENT, index.offset, index.length)
+                crc = int.from_bytes(body[-4:], "little")
+                if crc and crc != zlib.crc32(body[:-4]):
+                    raise McapError(f"the checksum of attachment {index.name!r} does not match")
+                attachment: Attachment = Attachment.read(ReadDataStream(io.BytesIO(body)))
+                found[index.name] = attachment.data
+        return found
 
     def verify_data(self) -> bool:
         """Hold the checksum of the whole data section against its bytes; False where the writer left it out.

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass
+from pathlib import PurePath
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.files import digest_value
@@ -55,6 +56,9 @@ class Scene:
             raise ValueError(f"metadata {RECORD} does not match its digest")
         if given.get("format_version") != str(FORMAT_VERSION):
             raise ValueError(f"its format version is {given.get('format_version')}; {FORMAT_VERSION} can be read")
+        for key in ("name", "split"):
+            if given[key] in ("", "..") or PurePath(given[key]).name != given[key]:
+                raise ValueError(f"its {key} {given[key]!r} is no file name")
         return cls(
             name=given["name"],
             dataset=given["dataset"],

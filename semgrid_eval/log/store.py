@@ -1,22 +1,19 @@
 """Write a recording as an MCAP log, find logs, and read them back moment by moment."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
 
-from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
-
-from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.files import atomic_file
-from semgrid_eval.frames.png import read_header, with_palette
 from semgrid_eval.frames.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Recording
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.container import Container, Entry, damage_as_log_error
-from semgrid_eval.log.motion import DeadReckoning
+from semgrid_eval.log.moments import MomentWriter, camera_frame, moment_topics, read_moments, read_picture
 from semgrid_eval.log.scene import RECORD, Scene
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.log.writer import MessageWriter
@@ -54,73 +51,33 @@ def write_log(recording: Recording, path: Path) -> None:
         writer.metadata(RECORD, scene.to_metadata())
         for name, data in sorted(recording.source_files.items()):
             writer.attach(name, _media_type(name), data)
-        _RecordingWriter(writer, recording).write()
+        MomentWriter(writer, recording).write()
 
 
-class _RecordingWriter:
-    """Writes the moments of one recording."""
+def read_recording(path: Path) -> Recording:
+    """Give what a log holds as a recording again; written anew, it makes the same bytes.
 
-    def __init__(self, writer: MessageWriter, recording: Recording) -> None:
-        self._writer = writer
-        self._recording = recording
-        self._reckoning = DeadReckoning()
-        self._palette = label_palette()
-        self._last_ns = -1
+    Each pass over its moments opens the log and streams from it. Motion after the last moment is left out.
 
-    def write(self) -> None:
-        count = 0
-        for moment in self._recording.moments():
-            self._motion(moment)
-            self._advance(moment.stamp_ns, "moment")
-            self._vehicle(moment)
-            for camera in sorted(moment.cameras):
-                self._camera(camera, moment.cameras[camera])
-            count += 1
-        if not count:
-            raise InputError("holds no frame", field=self._recording.name)
+    Raises:
+        LogError: the file cannot be read or is damaged; what is found only in passing is raised in passing.
+    """
+    with LogReader(path) as log:
+        return Recording(
+            name=log.scene.name,
+            dataset=log.scene.dataset,
+            split=log.scene.split,
+            calibrations={camera: log.calibration(camera) for camera in log.scene.cameras},
+            source_digest=log.scene.source_digest,
+            moments=partial(_moments, path),
+            source_files=log.source_files(),
+        )
 
-    def _advance(self, stamp_ns: int, what: str) -> None:
-        if stamp_ns < self._last_ns:
-            raise InputError(
-                f"{what} at {stamp_ns} ns comes after {self._last_ns} ns", field=f"{self._recording.name}: stamp_ns"
-            )
-        self._last_ns = stamp_ns
 
-    def _motion(self, moment: Moment) -> None:
-        for sample in moment.motion:
-            self._advance(sample.stamp_ns, "motion sample")
-            self._reckoning.add(sample)
-            self._writer.write(topics.EGO_MOTION, codec.motion_message(sample), log_ns=sample.stamp_ns)
-
-    def _vehicle(self, moment: Moment) -> None:
-        now_ns = moment.stamp_ns
-        pose = self._reckoning.pose_at(now_ns)
-        transforms = codec.transforms_message(pose, self._recording.calibrations)
-        self._writer.write(topics.TRANSFORMS, transforms, log_ns=now_ns)
-        self._writer.write(topics.EGO_POSE, codec.pose_message(pose, topics.ODOM_FRAME), log_ns=now_ns)
-        if moment.pose is not None:
-            message = codec.pose_message(moment.pose, topics.MAP_FRAME)
-            self._writer.write(topics.TRUE_POSE, message, log_ns=now_ns)
-        if moment.actors is not None:
-            self._writer.write(topics.TRUE_ACTORS, codec.actors_message(now_ns, moment.actors), log_ns=now_ns)
-
-    def _camera(self, camera: str, frame: CameraFrame) -> None:
-        header = read_header(frame.disparity_png)
-        calibration = self._recording.calibrations[camera]
-        known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, (header.width, header.height))
-        self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
-        self._writer.write(camera_topic(camera, topics.STEREO), rest, log_ns=frame.stamp_ns)
-        for field, (channel, notes) in topics.PICTURES.items():
-            png: bytes | None = getattr(frame, field)
-            if png is None:
-                continue
-            if channel in (topics.LABEL, topics.EXACT_LABEL):
-                png = with_palette(png, self._palette)
-            if channel == topics.IMAGE:
-                self._writer.end_chunk()
-            message = codec.image_message(frame.stamp_ns, camera, png)
-            self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes)
-        self._writer.end_chunk()
+def _moments(path: Path) -> Iterator[Moment]:
+    with LogReader(path) as log, damage_as_log_error(path):
+        cameras = log.scene.cameras
+        yield from read_moments(log.messages(moment_topics(cameras)), cameras)
 
 
 class LogReader:
@@ -257,15 +214,28 @@ class LogReader:
         fields = {camera_topic(camera, channel): field for field, (channel, _) in topics.PICTURES.items()}
         if not images:
             del fields[camera_topic(camera, topics.IMAGE)]
-        for stamp_ns, entries in groupby(self._container.entries(fields), key=lambda entry: entry.log_ns):
-            pictures = {fields[self._topic(entry)]: self._picture(entry) for entry in entries}
-            if "disparity_png" in pictures:
-                yield CameraFrame(
-                    stamp_ns=stamp_ns,
-                    image_png=pictures.pop("image_png", None),
-                    label_png=pictures.pop("label_png", None),
-                    **pictures,
-                )
+        for stamp_ns, messages in groupby(self.messages(fields), key=lambda message: message[1]):
+            with damage_as_log_error(self.path):
+                frame = camera_frame(stamp_ns, {fields[topic]: read_picture(data) for topic, _, data in messages})
+            if frame is not None:
+                yield frame
+
+    def messages(self, names: Iterable[str]) -> Iterator[tuple[str, int, bytes]]:
+        """Iterate over topic, time (ns) and data of some topics' messages, in the order of time, then of the file.
+
+        Raises:
+            LogError: what is read is damaged.
+        """
+        for entry in self._container.entries(names):
+            yield self._topic(entry), entry.log_ns, entry.data
+
+    def source_files(self) -> dict[str, bytes]:
+        """Return the source's files that are kept for the record, by name.
+
+        Raises:
+            LogError: one is damaged.
+        """
+        return self._container.attachments()
 
     def _require_camera(self, camera: str) -> None:
         if camera not in self.scene.cameras:
@@ -273,10 +243,6 @@ class LogReader:
 
     def _topic(self, entry: Entry) -> str:
         return self._container.summary.channels[entry.channel_id].topic
-
-    def _picture(self, entry: Entry) -> bytes:
-        with damage_as_log_error(self.path):
-            return bytes(CompressedImage.FromString(entry.data).data)
 
     def _decoded(self, topic: str, decode: Callable[[bytes], T]) -> Iterator[T]:
         for entry in self._container.entries([topic]):
