@@ -10,7 +10,7 @@ from semgrid_eval.executors import available_cores, local_executor
 
 PRESET = "demo"
 TOWNS = 8
-"""Two of each kind, so that training has seen every kind that validation holds."""
+"""Six for training and two for validation: training sees every kind of town."""
 
 
 @click.command("demo", epilog="Example: semgrid-eval demo --out demo")

@@ -14,6 +14,7 @@ from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
 from semgrid_eval.models.flow import FlowConfig
 from semgrid_eval.models.network import NetworkConfig
 from semgrid_eval.models.training import TrainingConfig
+from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.sequences.windows import WindowConfig
 
 TRAINED_MODEL = "ed"
@@ -36,6 +37,7 @@ class Row(Config):
         model: `ed`, a baseline (`newest`, `overlay`, `fuse`, `table`, `flow`), or `path.py:Class` of one's own.
         sensors: inputs, from the grid config's sensors.
         translate: whether inputs are moved to the target's time (T2); the paper's NT rows do not.
+        mask_mode: what becomes of the mask M in scores (reading 9).
         overlay: which sensor the `overlay` baseline draws last (reading 20).
         flow: what the `flow` baseline takes as evidence of motion.
         repeats: trainings with different seeds.
@@ -46,6 +48,7 @@ class Row(Config):
     model: str
     sensors: tuple[str, ...] = Field((TARGET_SENSOR,), min_length=1)
     translate: bool = True
+    mask_mode: MaskMode = "exclude"
     overlay: Literal["upper", "lower"] = "upper"
     flow: FlowConfig = FlowConfig()
     repeats: int = Field(1, ge=1, le=1000)

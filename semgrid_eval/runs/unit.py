@@ -61,7 +61,7 @@ class Worker:
             return result_id
         trained = self._train(job, row) if job else None
         with self._stage(f"score {row.name}") as progress:
-            evaluation = evaluate(_predictor(row, trained, counted), scored, progress=progress)
+            evaluation = evaluate(_predictor(row, trained, counted), scored, mask_mode=row.mask_mode, progress=progress)
         self._keep_windows(scored, windows_id)
         record = results.ResultRecord(
             format_version=results.FORMAT_VERSION,

@@ -2,11 +2,13 @@
 
 import time
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.errors import InputError
 from semgrid_eval.grids.spec import MOVING, STANDING
 from semgrid_eval.models.predictor import Predictor
@@ -14,13 +16,15 @@ from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores.iou import Counts, confusion
 from semgrid_eval.sequences.dataset import WindowSet
 
+MaskMode = Literal["exclude", "substitute", "off"]
+
 
 @dataclass(frozen=True)
 class Evaluation:
     """What is left of a predictor's answers.
 
     Args:
-        counts: (N, C, C) cells by target and predicted class, mask M left out.
+        counts: (N, C, C) cells by target and predicted class, mask M treated as asked.
         region_counts: the same of cells near `moving` and near `standing` actors alone; empty without the truth.
         prediction: (N, H, W) uint8 class ids.
         certainty: (N, H, W) uint8, the highest score of each cell, 255 = 1.
@@ -34,7 +38,14 @@ class Evaluation:
     seconds: float
 
 
-def evaluate(predictor: Predictor, windows: WindowSet, *, batch: int = 16, progress: Progress = silent) -> Evaluation:
+def evaluate(
+    predictor: Predictor,
+    windows: WindowSet,
+    *,
+    mask_mode: MaskMode = "exclude",
+    batch: int = 16,
+    progress: Progress = silent,
+) -> Evaluation:
     """Score a predictor over all windows, in order.
 
     Raises:
@@ -56,9 +67,10 @@ def evaluate(predictor: Predictor, windows: WindowSet, *, batch: int = 16, progr
         predictions.append(answer)
         certainties.append((certainty.float().clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy())
         target, mask = part.target.cpu().numpy(), part.mask.cpu().numpy()
-        counts.append(confusion(target, answer, mask))
+        scored, left_out = apply_mask(answer, mask, mask_mode)
+        counts.append(confusion(target, scored, left_out))
         for name, region in actor_regions(windows.actors(chosen)).items():
-            region_counts.setdefault(name, []).append(confusion(target, answer, mask | ~region))
+            region_counts.setdefault(name, []).append(confusion(target, scored, left_out | ~region))
         progress(sum(map(len, predictions)), len(windows))
     return Evaluation(
         np.concatenate(counts),
@@ -67,6 +79,19 @@ def evaluate(predictor: Predictor, windows: WindowSet, *, batch: int = 16, progr
         np.concatenate(certainties),
         seconds,
     )
+
+
+def apply_mask(
+    prediction: NDArray[np.uint8], mask: NDArray[np.bool_], mode: MaskMode
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Treat the cells of M (N, H, W) as reading 9 says: return the prediction to score and the cells to leave out.
+
+    `exclude` leaves them out, `substitute` counts them as correctly unknown, `off` scores them like any other.
+    """
+    if mode == "exclude":
+        return prediction, mask
+    scored = np.where(mask, np.uint8(UNKNOWN), prediction) if mode == "substitute" else prediction
+    return scored, np.zeros_like(mask)
 
 
 def actor_regions(actors: NDArray[np.uint8] | None) -> dict[str, NDArray[np.bool_]]:

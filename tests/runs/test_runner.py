@@ -225,6 +225,23 @@ def test_several_processes_give_the_same_bytes_as_one(logs, tmp_path):
                 assert not first.exists() or first.read_bytes() == second.read_bytes()
 
 
+@pytest.mark.parametrize("mode", ["exclude", "substitute", "off"])
+def test_mask_modes_differ_in_the_row_of_unknown_only(logs, tmp_path, mode):
+    record = run([{"name": "BL-DC", "model": "newest", "mask_mode": mode}], logs, tmp_path / "run")
+    folder = results.result_folder(tmp_path / "run", record.rows[0].results[0])
+    counts = results.read_counts(folder)
+    windows_id = results.read_result(folder).windows_id
+    windows = results.read_arrays(results.windows_file(tmp_path / "run", windows_id), ("mask", "target"))
+    prediction = results.read_arrays(folder / "predictions.npz", ("prediction",))["prediction"]
+    masked = windows["mask"].sum()
+    assert masked > 100
+    assert counts.sum() == windows["mask"].size - (masked if mode == "exclude" else 0)
+    right_unknown = ((prediction == 0) & (windows["target"] == 0) & ~windows["mask"]).sum()
+    seen_again = ((prediction == 0) & windows["mask"]).sum()
+    expected = {"exclude": 0, "substitute": masked, "off": seen_again}[mode]
+    assert counts[:, 0, 0].sum() == right_unknown + expected
+
+
 def test_two_logs_of_one_recording_are_refused(tmp_path):
     for name in ("a", "b"):
         write_log(street(1, frames=9).recording("twin"), tmp_path / "logs" / f"{name}.mcap")
