@@ -7,12 +7,13 @@ from pathlib import Path
 import semgrid_eval
 
 ROOT = Path(semgrid_eval.__file__).parent
-FLOORS = ["ground", "frames", "log", "grids", "sequences", "models", "scores", "runs", "report", "cli"]
+FLOORS = ["ground", "frames", "log", "segmentation", "grids", "sequences", "models", "scores", "runs", "report", "cli"]
 ALLOWED_IN = {
     "mcap": {"log"},
     "google": {"log"},
     "foxglove_schemas_protobuf": {"log"},
-    "torch": {"segmentation", "sequences", "models", "scores", "runs"},
+    "onnxruntime": {"segmentation"},
+    "torch": {"sequences", "models", "scores", "runs"},
     "click": {"cli"},
     "rich": {"cli"},
     "ray": {"runs"},

@@ -12,6 +12,7 @@ from semgrid_eval.errors import SemgridError
 _COMMANDS = {
     "convert": "semgrid_eval.cli.convert",
     "check": "semgrid_eval.cli.check",
+    "segment": "semgrid_eval.cli.segment",
     "grids": "semgrid_eval.cli.grids",
     "run": "semgrid_eval.cli.run",
     "report": "semgrid_eval.cli.report",

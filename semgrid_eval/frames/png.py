@@ -96,6 +96,18 @@ def decode_ids(data: bytes, path: Path | None = None) -> NDArray[np.uint8]:
     return ids
 
 
+def decode_colour(data: bytes, path: Path | None = None) -> NDArray[np.uint8]:
+    """Decode a picture of at most 8 bits a channel as RGB: (H, W, 3); gray is repeated, alpha left out.
+
+    Raises:
+        InputError: the file is damaged or of more than 8 bits.
+    """
+    header = read_header(data, path)
+    if header.bit_depth > 8:
+        raise InputError(f"is {header}; at most 8 bits a channel are needed", path=path)
+    return _pixels(data, path, mode="RGB").astype(np.uint8, copy=False)
+
+
 def encode_gray(picture: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     """Encode a picture (H, W), uint8 or uint16, as a gray PNG file."""
     assert picture.ndim == 2
@@ -126,11 +138,11 @@ def with_palette(data: bytes, palette: NDArray[np.uint8], path: Path | None = No
     return _SIGNATURE + _pack(b"IHDR", bytes(fields)) + _pack(b"PLTE", palette.tobytes()) + kept
 
 
-def _pixels(data: bytes, path: Path | None) -> NDArray[np.generic]:
+def _pixels(data: bytes, path: Path | None, *, mode: str | None = None) -> NDArray[np.generic]:
     # Pillow gives the indices of a palette picture, where OpenCV gives colours, and was as fast for both kinds.
     try:
         with Image.open(io.BytesIO(data), formats=["PNG"]) as picture:
-            return np.array(picture)
+            return np.array(picture if mode is None else picture.convert(mode))
     except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error) as error:
         raise InputError(f"is a damaged PNG file: {error}", path=path) from error
 

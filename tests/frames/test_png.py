@@ -12,7 +12,15 @@ from PIL import Image
 
 from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError
-from semgrid_eval.frames.png import MAX_PIXELS, decode_gray, decode_ids, encode_gray, read_header, with_palette
+from semgrid_eval.frames.png import (
+    MAX_PIXELS,
+    decode_colour,
+    decode_gray,
+    decode_ids,
+    encode_gray,
+    read_header,
+    with_palette,
+)
 
 SHAPES = arrays.array_shapes(min_dims=2, max_dims=2, max_side=40)
 GRAY_8 = arrays.arrays(np.uint8, SHAPES)
@@ -144,3 +152,20 @@ def test_every_flipped_bit_is_seen(data):
 def test_pixels_that_cannot_be_decoded_are_an_error_even_if_checksums_fit(pixels):
     with pytest.raises(InputError, match="damaged PNG"):
         decode_gray(png(3, 3, 8, 0, chunk(b"IDAT", pixels)), bit_depth=8)
+
+
+@pytest.mark.parametrize("mode", ["RGB", "RGBA", "P"])
+def test_colour_pictures_of_every_kind_come_out_as_rgb(mode):
+    colours = np.array([[[255, 0, 0], [0, 0, 255], [51, 51, 51]], [[255, 255, 0], [0, 255, 0], [0, 0, 0]]], np.uint8)
+    stream = io.BytesIO()
+    Image.fromarray(colours).convert(mode).save(stream, "PNG")
+    assert decode_colour(stream.getvalue()).tolist() == colours.tolist()
+
+
+def test_gray_pictures_come_out_as_equal_channels():
+    assert decode_colour(encode_gray(np.array([[7, 200]], np.uint8))).tolist() == [[[7, 7, 7], [200, 200, 200]]]
+
+
+def test_colour_pictures_of_16_bits_are_refused():
+    with pytest.raises(InputError, match="at most 8 bits a channel are needed"):
+        decode_colour(encode_gray(np.zeros((2, 2), np.uint16)))

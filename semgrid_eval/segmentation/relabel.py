@@ -1,0 +1,149 @@
+"""Logs anew, with the label images that a segmentation network gives for their colour images."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from glob import escape
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.executors import Executor
+from semgrid_eval.files import digest_files, digest_value
+from semgrid_eval.frames.png import decode_colour, encode_gray
+from semgrid_eval.frames.types import CameraFrame, Moment, Recording
+from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
+from semgrid_eval.log.store import LogReader, find_logs, read_recording
+from semgrid_eval.progress import Progress
+from semgrid_eval.segmentation.config import SegmentationConfig
+from semgrid_eval.segmentation.network import SegmentationNetwork
+
+RECORD = "segmentation.json"
+"""The attachment that says what made the labels."""
+_METHOD_VERSION = 1
+Labeller = Callable[[NDArray[np.uint8]], NDArray[np.uint8]]
+
+
+def segment_logs(
+    logs: Sequence[Path],
+    model: Path,
+    config: SegmentationConfig,
+    out: Path,
+    *,
+    executor: Executor,
+    progress: Progress,
+) -> ConversionSummary:
+    """Write the log OUT/<split>/<name>.mcap for each log: all it holds, its label images made by a network.
+
+    A log that is whole and was made from the same log, model and config is left as it is. One that fails is named in
+    the summary with its reason.
+
+    Args:
+        logs: files, and folders of which all logs are taken.
+        model: the ONNX file; files beside it whose names begin with its name (its weights) count as part of it.
+        config: how the model is to be used.
+        out: the folder of the new logs; it must not hold, or lie in, one of `logs`.
+        executor: where logs are worked on.
+        progress: told after each log.
+
+    Raises:
+        MissingExtraError: ONNX Runtime is not installed.
+        InputError: the model cannot be used, a folder holds no log, two logs have one name, or `out` would mix the new
+            logs with the old.
+    """
+    _refuse_mixing(logs, out)
+    paths = [path for given in logs for path in (find_logs(given) if given.is_dir() else [given])]
+    SegmentationNetwork(model, config)  # a model that cannot be used is one error, not one for each log
+    recipe = _Recipe(model, digest_files(_files_of(model)), config)
+    return convert_recordings([_job(path, recipe) for path in paths], out, executor=executor, progress=progress)
+
+
+def relabelled(recording: Recording, label: Labeller) -> Recording:
+    """Replace the label images of a recording by what `label` gives for its colour images, (H, W, 3) -> (H, W).
+
+    A frame without colour image has no label image then; if none has one, the pass over the moments ends with an
+    InputError.
+    """
+    return replace(recording, moments=partial(_moments, recording, label))
+
+
+def _moments(recording: Recording, label: Labeller) -> Iterator[Moment]:
+    count = 0
+    for moment in recording.moments():
+        cameras = {camera: _relabelled_frame(frame, label) for camera, frame in moment.cameras.items()}
+        count += sum(frame.label_png is not None for frame in cameras.values())
+        yield replace(moment, cameras=cameras)
+    if not count:
+        raise InputError("has no colour image", field=recording.name)
+
+
+def _relabelled_frame(frame: CameraFrame, label: Labeller) -> CameraFrame:
+    if frame.image_png is None:
+        return replace(frame, label_png=None)
+    return replace(frame, label_png=encode_gray(label(decode_colour(frame.image_png))))
+
+
+@dataclass(frozen=True)
+class _Recipe:
+    """Everything but the log that determines the new log; it travels to other processes."""
+
+    model: Path
+    model_digest: str
+    config: SegmentationConfig
+
+    def record(self, log_digest: str) -> dict[str, object]:
+        """Say what made the labels of a log."""
+        return {
+            "model": self.model.name,
+            "model_digest": self.model_digest,
+            "log_digest": log_digest,
+            "config": self.config.model_dump(mode="json"),
+            "method_version": _METHOD_VERSION,
+        }
+
+    def digest(self, path: Path) -> str:
+        """Digest what makes the new log of a log."""
+        return digest_value(self.record(_digest_of(path)))
+
+    def recording(self, path: Path) -> Recording:
+        """Give the new recording of a log."""
+        record = self.record(_digest_of(path))
+        recording = relabelled(read_recording(path), _network(self.model, self.model_digest, self.config).label)
+        note = json.dumps(record, indent=2, sort_keys=True).encode()
+        files = {**recording.source_files, RECORD: note}
+        return replace(recording, source_digest=digest_value(record), source_files=files)
+
+
+def _job(path: Path, recipe: _Recipe) -> ConversionJob:
+    try:
+        with LogReader(path) as log:
+            name, split = log.scene.name, log.scene.split
+    except LogError:  # named by its place; what is wrong is said when its turn comes
+        name, split = path.stem, path.parent.name
+    return ConversionJob(name, split, partial(recipe.digest, path), partial(recipe.recording, path))
+
+
+@lru_cache(maxsize=1)
+def _network(model: Path, model_digest: str, config: SegmentationConfig) -> SegmentationNetwork:
+    """Open a model once for all logs of a process."""
+    return SegmentationNetwork(model, config)
+
+
+def _files_of(model: Path) -> list[Path]:
+    return sorted(path for path in model.parent.glob(f"{escape(model.name)}*") if path.is_file())
+
+
+def _digest_of(path: Path) -> str:
+    with LogReader(path) as log:
+        return log.digest
+
+
+def _refuse_mixing(logs: Sequence[Path], out: Path) -> None:
+    target = out.resolve()
+    for path in logs:
+        source = path.resolve()
+        if source.is_relative_to(target) or target.is_relative_to(source):
+            raise InputError(f"holds, or lies in, {path}; new logs need a folder of their own", path=out, field="out")
