@@ -1,11 +1,16 @@
 """`semgrid-eval run`: work off an experiment matrix."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
 from semgrid_eval.executors import Executor, available_cores, local_executor
+
+if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
+    from semgrid_eval.runs.matrix import Matrix
+    from semgrid_eval.runs.runner import RunOptions
 
 
 @click.command("run", epilog="Example: semgrid-eval run baselines --logs logs --out runs/first")
@@ -27,6 +32,7 @@ from semgrid_eval.executors import Executor, available_cores, local_executor
     "--address", default="local", show_default=True, help="Of a running Ray cluster; 'local' starts one here."
 )
 @click.option("--gpus", type=click.FloatRange(0), default=0.0, help="With Ray: GPUs for each row; fractions share one.")
+@click.option("--dry-run", is_flag=True, help="Only say what would be done and how long it would take.")
 def command(
     matrix: str,
     logs: Path,
@@ -38,6 +44,7 @@ def command(
     executor: str,
     address: str,
     gpus: float,
+    dry_run: bool,
 ) -> int:
     """Train and score every row of MATRIX, a YAML file or the name of a preset.
 
@@ -46,6 +53,8 @@ def command(
 
     Rows can be spread over processes of this machine (--jobs) or over a Ray cluster (--executor ray), whose machines
     must all reach the folders of logs, grids and the run under the same paths.
+
+    --dry-run builds the grids, which a run then finds, times a few updates of each network, and prints the plan.
     """
     from semgrid_eval.runs.matrix import load_matrix
     from semgrid_eval.runs.runner import RunOptions, run_matrix
@@ -53,6 +62,8 @@ def command(
     resolved = load_matrix(matrix)
     rows_on: Executor = local_executor(jobs) if executor == "local" else _ray(address, jobs, gpus)
     options = RunOptions(device, grids or out / "grids", command_line(), rows_on, local_executor(workers))
+    if dry_run:
+        return _show_plan(resolved, logs, out, options)
     record = run_matrix(resolved, logs, out, options, stage=progress)
     for row in record.rows:
         if row.failure:
@@ -61,6 +72,19 @@ def command(
         say(f"Error: {reason}")
     click.echo(out)
     return 1 if record.failed_logs or any(row.failure for row in record.rows) else 0
+
+
+def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -> int:
+    from semgrid_eval.runs.plan import plan_run, total_seconds
+
+    units = plan_run(matrix, logs, out, options, stage=progress)
+    click.echo("rows\tseed\twindows\tupdates\tsamples\tminutes\tstate")
+    for unit in units:
+        state = unit.failure or ("done" if unit.done else "to do")
+        numbers = (unit.seed if unit.seed is not None else "-", unit.windows, unit.updates, unit.samples)
+        click.echo("\t".join(map(str, (",".join(unit.rows), *numbers, f"{unit.seconds / 60:.1f}", state))))
+    say(f"About {total_seconds(units) / 60:.0f} minutes on this machine, one row at a time.")
+    return 1 if any(unit.failure for unit in units) else 0
 
 
 def _ray(address: str, jobs: int, gpus: float) -> Executor:

@@ -74,24 +74,39 @@ def run_matrix(
         InputError: there is no log at all, or the device does not exist.
     """
     started = _Clock()
-    device = choose_device(options.device)
-    sources = Sources(logs, options.grids, matrix.rows, executor=options.grid_executor, device=device, stage=stage)
-    sources.prepare()
+    worker, sources = _open(matrix, logs, out, options, stage)
     units = plan_units(matrix)
     outcomes: dict[str, Outcome] = {}
 
     def keep_record() -> results.RunRecord:
-        record = _record(matrix, options.command, started, device, sources, outcomes)
+        record = _record(matrix, options.command, started, worker.device, sources, outcomes)
         results.write_run(out, record)  # a run that is stopped can be reported as far as it came
         return record
 
     record = keep_record()
     keys = list(units)
-    with _unit_work(matrix, logs, out, options, sources, stage) as work:
+    with _unit_work(matrix, logs, out, options, worker, stage) as work:
         for index, outcome in options.executor.run(work, [units[key] for key in keys]):
             outcomes[keys[index]] = Outcome(None, outcome.reason) if isinstance(outcome, WorkerDied) else outcome
             record = keep_record()
     return record
+
+
+def open_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:
+    """Build what grids are missing and give the worker of this process.
+
+    Raises:
+        InputError: there is no log at all, or the device does not exist.
+    """
+    return _open(matrix, logs, out, options, stage)[0]
+
+
+def _open(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> tuple[Worker, Sources]:
+    keep_freed_memory()
+    device = choose_device(options.device)
+    sources = Sources(logs, options.grids, matrix.rows, executor=options.grid_executor, device=device, stage=stage)
+    sources.prepare()
+    return Worker(out, sources, device, matrix.seed, stage), sources
 
 
 class _Clock:
@@ -108,12 +123,10 @@ class _Clock:
 
 @contextmanager
 def _unit_work(
-    matrix: Matrix, logs: Path, out: Path, options: RunOptions, sources: Sources, stage: Stage
+    matrix: Matrix, logs: Path, out: Path, options: RunOptions, worker: Worker, stage: Stage
 ) -> Iterator[Callable[[Unit], Outcome]]:
     """Give the function that works off one unit, here or wherever the executor sends it."""
-    keep_freed_memory()
     if options.executor.parallel == 1:
-        worker = Worker(out, sources, choose_device(options.device), matrix.seed, stage)
         yield partial(_attempt, worker)
         return
     # Elsewhere the same folder may be another one: paths must not depend on where a process stands.

@@ -40,8 +40,23 @@ class Worker:
     """
 
     def __init__(self, out: Path, sources: Sources, device: torch.device, example_seed: int, stage: Stage) -> None:
-        self._out, self._sources, self._device, self._stage = out, sources, device, stage
+        self._out, self._sources, self.device, self._stage = out, sources, device, stage
         self._example_seed = example_seed
+
+    def look(self, row: Row, seed: int | None) -> "Job":
+        """Resolve a row with one seed into its windows, its training and the id of its result.
+
+        Raises:
+            SemgridError: the row cannot be run; the message says why.
+        """
+        scored = self._window_set(row, row.validation_split, validation_windows)
+        windows_id = digest_value([scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
+        training = self._training(row, seed) if seed is not None else None
+        counted = self._window_set(row, row.train_split, training_windows) if row.model == "table" else None
+        config = _config(row)
+        learned_from = training.id if training else counted.digest() if counted is not None else None
+        result_id = digest_value([results.FORMAT_VERSION, config, windows_id, learned_from])
+        return Job(result_id, config, scored, windows_id, training, counted)
 
     def run(self, row: Row, seed: int | None) -> str:
         """Make sure that the result of a row with one seed lies in the run's folder, and return its id.
@@ -49,65 +64,60 @@ class Worker:
         Raises:
             SemgridError: the row cannot be run; the message says why.
         """
-        scored = self._window_set(row, row.validation_split, validation_windows)
-        windows_id = digest_value([scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
-        job = self._training(row, seed) if seed is not None else None
-        counted = self._window_set(row, row.train_split, training_windows) if row.model == "table" else None
-        config = _config(row)
-        learned_from = job.id if job else counted.digest() if counted is not None else None
-        result_id = digest_value([results.FORMAT_VERSION, config, windows_id, learned_from])
-        folder = results.result_folder(self._out, result_id)
+        job = self.look(row, seed)
+        folder = results.result_folder(self._out, job.result_id)
         if results.is_done(folder):
-            return result_id
-        trained = self._train(job, row) if job else None
+            return job.result_id
+        trained = self._train(job.training, row) if job.training else None
+        predictor = _predictor(row, trained, job.counted)
         with self._stage(f"score {row.name}") as progress:
-            evaluation = evaluate(_predictor(row, trained, counted), scored, mask_mode=row.mask_mode, progress=progress)
-        self._keep_windows(scored, windows_id)
+            evaluation = evaluate(predictor, job.scored, mask_mode=row.mask_mode, progress=progress)
+        self._keep_windows(job.scored, job.windows_id)
         record = results.ResultRecord(
             format_version=results.FORMAT_VERSION,
-            id=result_id,
-            config=config,
-            log_digests=tuple(sorted(set(scored.data.digests))),
+            id=job.result_id,
+            config=job.config,
+            log_digests=tuple(sorted(set(job.scored.data.digests))),
             seed=seed,
-            windows_id=windows_id,
-            windows=_window_records(scored, self._sources.log_of),
-            device=str(self._device),
+            windows_id=job.windows_id,
+            windows=_window_records(job.scored, self._sources.log_of),
+            device=str(self.device),
             train_seconds=round(trained.seconds, 3) if trained else None,
             predict_seconds=round(evaluation.seconds, 6),
             parameters=trained.network.parameter_count if trained else None,
         )
-        history = job.folder / HISTORY_FILE if job else None
+        history = job.training.folder / HISTORY_FILE if job.training else None
         _keep_result(folder, record, evaluation, history, with_predictions=seed in (None, self._example_seed))
-        return result_id
+        return job.result_id
 
     def _window_set(self, row: Row, split: str, plan: Callable[[list[int], WindowConfig], WindowPlan]) -> WindowSet:
         data = self._sources.data(row.grid, split)
         windows = plan(data.frame_counts, row.window).windows
         return select_windows(data, windows, sensors=row.sensors, translate=row.translate)
 
-    def _training(self, row: Row, seed: int) -> "_Training":
+    def _training(self, row: Row, seed: int) -> "Training":
         windows = self._window_set(row, row.train_split, training_windows)
         watched = self._window_set(row, row.validation_split, validation_windows)
         training_id = digest_value(
             {
                 "network": row.network.model_dump(),
                 "training": row.training.model_dump(),
-                "precision": str(choose_precision(row.training.precision, self._device)),
-                "device": self._device.type,
+                "precision": str(choose_precision(row.training.precision, self.device)),
+                "device": self.device.type,
                 "seed": seed,
                 "windows": [windows.digest(), watched.digest(), grid_digest(row.grid)],
             }
         )
-        return _Training(training_id, self._out / "trainings" / training_id, seed, windows, watched)
+        return Training(training_id, self._out / "trainings" / training_id, seed, windows, watched)
 
-    def _train(self, job: "_Training", row: Row) -> Trained:
+    def _train(self, job: "Training", row: Row) -> Trained:
         with self._stage(f"train {row.name} (seed {job.seed})") as progress:
             return train(
                 job.windows,
                 row.network,
                 row.training,
                 seed=job.seed,
-                device=self._device,
+                device=self.device,
                 folder=job.folder,
                 progress=progress,
                 validation=job.watched,
@@ -120,7 +130,27 @@ class Worker:
 
 
 @dataclass(frozen=True)
-class _Training:
+class Job:
+    """A row with one seed, resolved.
+
+    Args:
+        result_id: names the result's folder.
+        config: what determined it, for the record.
+        scored: validation windows; `windows_id` names their file.
+        training: what has to be trained, if anything.
+        counted: training windows of BL-Table.
+    """
+
+    result_id: str
+    config: dict[str, object]
+    scored: WindowSet
+    windows_id: str
+    training: "Training | None"
+    counted: WindowSet | None
+
+
+@dataclass(frozen=True)
+class Training:
     """A training that a row asks for; rows that ask for the same one share its folder."""
 
     id: str

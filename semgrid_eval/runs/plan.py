@@ -1,0 +1,111 @@
+"""What a run would do, and about how long it would take on this machine: measured on the run's own windows."""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from semgrid_eval.errors import SemgridError
+from semgrid_eval.files import digest_value
+from semgrid_eval.models.training import train
+from semgrid_eval.progress import Stage, silent_stage
+from semgrid_eval.runs.matrix import Matrix, Row
+from semgrid_eval.runs.runner import RunOptions, Unit, open_worker, plan_units
+from semgrid_eval.runs.unit import Training, Worker
+from semgrid_eval.scores.results import is_done, result_folder
+
+CALIBRATION_EPOCHS = 3
+CALIBRATION_UPDATES = 4
+SCORING_SHARE = 0.4
+"""Time of a forward pass against forward and backward together, as measured on CPUs; it prices validation."""
+
+
+@dataclass(frozen=True)
+class PlannedUnit:
+    """A row with one seed.
+
+    Args:
+        rows: names of the rows that share it.
+        updates: to be made, 0 where nothing is trained.
+        samples: windows to be seen by them.
+        seconds: estimated; 0 where the result is there already.
+        failure: why it cannot be run.
+    """
+
+    rows: tuple[str, ...]
+    seed: int | None
+    windows: int
+    updates: int
+    samples: int
+    seconds: float
+    done: bool
+    failure: str | None = None
+
+
+def plan_run(
+    matrix: Matrix, logs: Path, out: Path, options: RunOptions, *, stage: Stage = silent_stage
+) -> list[PlannedUnit]:
+    """List what a run would do; grids are built, which the run then finds, and nothing is trained but samples.
+
+    Raises:
+        InputError: there is no log at all, or the device does not exist.
+    """
+    worker = open_worker(matrix, logs, out, options, stage)
+    units = plan_units(matrix)
+    sharing: dict[str, list[str]] = {key: [] for key in units}
+    for row in matrix.rows:
+        for key in plan_units(matrix.model_copy(update={"rows": (row,)})):
+            sharing[key].append(row.name)
+    speed = _Speed(worker)
+    planned = []
+    with stage("plan") as progress:
+        for number, (key, unit) in enumerate(units.items(), start=1):
+            planned.append(_plan_unit(worker, unit, tuple(sharing[key]), out, speed))
+            progress(number, len(units), unit.row.name)
+    return planned
+
+
+def total_seconds(units: Sequence[PlannedUnit]) -> float:
+    """Sum the estimates."""
+    return sum(unit.seconds for unit in units)
+
+
+def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], out: Path, speed: "_Speed") -> PlannedUnit:
+    try:
+        job = worker.look(unit.row, unit.seed)
+    except SemgridError as error:
+        return PlannedUnit(rows, unit.seed, 0, 0, 0, 0.0, done=False, failure=str(error))
+    config = unit.row.training
+    updates = config.updates_until(config.epochs) if job.training else 0
+    done = is_done(result_folder(out, job.result_id))
+    seconds = 0.0 if done or job.training is None else speed.seconds(unit.row, job.training)
+    return PlannedUnit(rows, unit.seed, len(job.scored), updates, updates * config.batch, seconds, done)
+
+
+class _Speed:
+    """Seconds that trainings take, measured once for each shape of network, batch and input."""
+
+    def __init__(self, worker: Worker) -> None:
+        self._worker = worker
+        self._seconds_by_shape: dict[str, float] = {}
+
+    def seconds(self, row: Row, training: Training) -> float:
+        """Estimate a whole training with its validation after each epoch."""
+        shape = digest_value(
+            [row.network.model_dump(), row.training.batch, row.training.precision, training.windows.grids_per_window]
+        )
+        if shape not in self._seconds_by_shape:
+            self._seconds_by_shape[shape] = self._measure(row, training)
+        of_update = self._seconds_by_shape[shape]
+        validated = row.training.epochs * len(training.watched)
+        updates = row.training.updates_until(row.training.epochs)
+        return of_update * (updates + SCORING_SHARE * validated / row.training.batch)
+
+    def _measure(self, row: Row, training: Training) -> float:
+        short = row.training.model_copy(
+            update={"epochs": CALIBRATION_EPOCHS, "updates_per_epoch": CALIBRATION_UPDATES, "epoch_unit": "batches"}
+        )
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "sample"
+            trained = train(training.windows, row.network, short, seed=0, device=self._worker.device, folder=path)
+        return min(epoch.seconds for epoch in trained.history) / CALIBRATION_UPDATES

@@ -1,0 +1,103 @@
+import shlex
+
+import pytest
+import yaml
+from click.testing import CliRunner
+from support.toy_world import street
+
+from semgrid_eval.cli.main import cli, main
+from semgrid_eval.log.store import write_log
+from semgrid_eval.scores.results import read_run
+
+SMALL = {"window": {"step_frames": 3, "target_frame": 8}, "network": {"features": 4, "depth": 2}}
+TRAINING = {"epochs": 2, "updates_per_epoch": 3, "batch": 2}
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cli") / "logs"
+    for i, split in enumerate(("train", "val")):
+        write_log(street(i, frames=26).recording(f"toy{i}", split), folder / split / f"toy{i}.mcap")
+    return folder
+
+
+@pytest.fixture
+def here(tmp_path, logs, monkeypatch):
+    (tmp_path / "logs").symlink_to(logs)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def call(*arguments):
+    result = CliRunner().invoke(cli, list(arguments), standalone_mode=False)
+    if result.exception:
+        raise result.exception
+    return result
+
+
+def example_of(command):
+    epilog = call(command, "--help").stdout.partition("Example: semgrid-eval ")[2]
+    return shlex.split(epilog)
+
+
+def matrix(folder, rows):
+    path = folder / "m.yaml"
+    path.write_text(yaml.safe_dump({"defaults": {**SMALL, "training": TRAINING}, "rows": rows}))
+    return str(path)
+
+
+def test_example_of_run_runs(here):
+    result = call(*example_of("run"))
+    assert result.return_value == 0
+    assert result.stdout.splitlines()[-1] == "runs/first"
+    assert [row.name for row in read_run(here / "runs" / "first").rows][:2] == ["BL-DC", "BL-NT"]
+
+
+def test_example_of_grids_runs_and_a_second_time_finds_all(here):
+    assert call(*example_of("grids")).return_value == 0
+    assert "0 logs built, 2 re-used" in call(*example_of("grids")).stderr
+
+
+def test_dry_run_tells_updates_and_minutes_and_trains_nothing(here):
+    rows = [{"name": "BL-DC", "model": "newest"}, {"name": "ED-DC", "model": "ed"}, {"name": "ED-SL2", "model": "ed"}]
+    arguments = ["run", matrix(here, rows), "--logs", "logs", "--out", "run"]
+    table = [line.split("\t") for line in call(*arguments, "--dry-run").stdout.splitlines()]
+    assert [line[0] for line in table] == ["rows", "BL-DC", "ED-DC,ED-SL2"]
+    assert table[2][1:5] == ["0", "1", "6", "12"]
+    assert not (here / "run" / "trainings").exists()
+    assert not (here / "run" / "results").exists()
+    call(*arguments)
+    assert call(*arguments, "--dry-run").stdout.count("\tdone") == 2
+
+
+def test_a_failing_row_is_one_line_and_exit_code_1(here):
+    rows = [{"name": "BL-DC", "model": "newest"}, {"name": "BL-x", "model": "newest", "validation_split": "nowhere"}]
+    result = call("run", matrix(here, rows), "--logs", "logs", "--out", "run")
+    assert result.return_value == 1
+    errors = [line for line in result.stderr.splitlines() if line.startswith("Error")]
+    assert errors == [
+        "Error: row BL-x: no recording of split 'nowhere' gave grids (splits found: train, val)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "m.yaml", "--logs", "logs", "--out", "run"], "m.yaml: is neither a file nor a preset"),
+        (["run", "smoke", "--logs", "logs", "--out", "run", "--device", "tpu"], "device: no device 'tpu' here"),
+        (["run", "smoke", "--logs", "empty", "--out", "run"], "empty: holds no .mcap log"),
+        (["run", "smoke", "--logs", "logs", "--out", "file/run"], "cannot be written"),
+        (["grids", "logs", "out", "--config", "grid.yaml"], "grid.yaml: morfology: unknown key"),
+    ],
+)
+def test_a_users_mistake_is_one_line_without_a_traceback(here, capsys, arguments, message):
+    (here / "empty").mkdir()
+    (here / "file").write_text("")
+    (here / "grid.yaml").write_text("morfology: off")
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 1
+    lines = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("grids:")]
+    assert len(lines) == 1
+    assert lines[0].startswith("Error: ")
+    assert message in lines[0]
