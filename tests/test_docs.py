@@ -1,0 +1,96 @@
+"""What README shows is what the program does: commands parse, YAML loads, the model runs, links lead somewhere."""
+
+import re
+import shlex
+from pathlib import Path
+
+import click
+import pytest
+import torch
+import yaml
+
+from semgrid_eval.cli.main import cli
+from semgrid_eval.models.predictor import load_predictor
+from semgrid_eval.runs.matrix import load_matrix
+from semgrid_eval.sequences.dataset import WindowBatch
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+
+
+def commands():
+    lines = [line.partition("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
+    return [line for line in lines if line.startswith("semgrid-eval ")]
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch):
+    """Everything that README's commands take as given."""
+    monkeypatch.chdir(tmp_path)
+    for folder in ("SRC", "PREDICTIONS", "logs/val", "runs/first"):
+        Path(folder).mkdir(parents=True)
+    for file in ("logs/val/a.mcap", "network.onnx"):
+        Path(file).touch()
+    return tmp_path
+
+
+@pytest.mark.parametrize("line", commands())
+def test_commands_of_the_readme_parse(workplace, line):
+    arguments = [part for word in shlex.split(line)[1:] for part in (sorted(map(str, Path().glob(word))) or [word])]
+    command, context = cli, click.Context(cli)
+    while isinstance(command, click.Group):
+        name, *arguments = arguments
+        command = command.get_command(context, name)
+        assert command is not None, name
+    command.make_context(name, arguments)
+
+
+def test_matrices_of_the_readme_load(tmp_path):
+    loaded = 0
+    for block in blocks("yaml"):
+        if "rows:" in block:
+            (tmp_path / "m.yaml").write_text(block)
+            loaded += len(load_matrix(str(tmp_path / "m.yaml")).rows)
+    assert loaded == 10
+
+
+def test_model_of_the_readme_predicts_the_newest_grid(tmp_path):
+    (tmp_path / "mine.py").write_text(next(block for block in blocks("python") if "class Newest" in block))
+    past = torch.randint(0, 10, (2, 1, 2, 8, 8), dtype=torch.uint8)
+    empty = torch.zeros(2, 8, 8)
+    batch = WindowBatch(past, ("full",), torch.zeros(2, 2, 2), torch.zeros(2, 2), empty, empty.bool())
+    answer = load_predictor(f"{tmp_path}/mine.py:Newest")(batch)
+    assert torch.equal(answer.argmax(dim=1), past[:, 0, -1].long())
+
+
+@pytest.mark.parametrize("page", ["README.md", "ARCHITECTURE.md", "docs/town.md"])
+def test_links_and_files_that_a_page_names_exist(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    links = [target for target in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in target]
+    assert [link for link in links if not ((ROOT / page).parent / link).exists()] == []
+
+
+def test_make_installs_extras_that_exist():
+    extras = set(re.findall(r"\.\[([a-z,]+)\]", (ROOT / "Makefile").read_text())[0].split(","))
+    declared = set(re.findall(r"^(\w+) = \[", (ROOT / "pyproject.toml").read_text(), re.MULTILINE))
+    assert extras <= declared
+
+
+def test_ci_calls_make_test():
+    assert "make test" in (ROOT / ".ci" / "run").read_text()
+
+
+def test_presets_named_in_the_readme_exist():
+    named = re.search(r"Presets: ([a-z, -]+);", README)
+    assert named is not None
+    for name in named.group(1).split(","):
+        assert load_matrix(name.strip()).rows
+
+
+def test_yaml_blocks_are_yaml():
+    for block in blocks("yaml"):
+        assert yaml.safe_load(block)
