@@ -41,6 +41,7 @@ class Row(Config):
         overlay: which sensor the `overlay` baseline draws last (reading 20).
         flow: what the `flow` baseline takes as evidence of motion.
         repeats: trainings with different seeds.
+        validation_window: where it differs from `window`, for recordings of another frame rate; same number of inputs.
     """
 
     name: str = Field(min_length=1, max_length=200)
@@ -56,6 +57,7 @@ class Row(Config):
     validation_split: str = "val"
     grid: GridConfig = GridConfig()
     window: WindowConfig = WindowConfig()
+    validation_window: WindowConfig | None = None
     network: NetworkConfig = NetworkConfig()
     training: TrainingConfig = TrainingConfig()
 
@@ -69,6 +71,8 @@ class Row(Config):
             raise ValueError(
                 f"model {self.model!r} is not one of {', '.join((TRAINED_MODEL, *BASELINES))} or path.py:Class"
             )
+        if self.scored_window.inputs != self.window.inputs:
+            raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
         if self.model == "overlay" and len(self.sensors) != 2:
             raise ValueError("overlay needs two sensors: the upper and the lower")
         return self
@@ -84,6 +88,11 @@ class Row(Config):
         return self.experiment or self.name.removeprefix("BL-").removeprefix("ED-")
 
     @property
+    def scored_window(self) -> WindowConfig:
+        """Windows that are scored."""
+        return self.validation_window or self.window
+
+    @property
     def kind(self) -> str:
         """Kind of model: `ED`, `BL`, or whatever stands before the first hyphen of the name of one's own."""
         if self.trained:
@@ -94,12 +103,12 @@ class Row(Config):
     def label(self) -> str:
         """Name and, in words, what the row does; the horizon is always said (reading 2)."""
         what = {"ed": f"encoder-decoder d {self.network.depth}, f {self.network.features}", **BASELINES}
-        horizon = self.window.horizon_steps
+        horizon = self.scored_window.horizon_steps
         parts = [
             what.get(self.model, self.model),
             "moved to the target's time" if self.translate else "not moved",
             f"{self.window.inputs} inputs",
-            f"{horizon} step{'s' if horizon > 1 else ''} of {self.window.step_frames} frames ahead",
+            f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead",
         ]
         return f"{self.name} ({', '.join(parts)})"
 

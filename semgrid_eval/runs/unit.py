@@ -49,10 +49,10 @@ class Worker:
         Raises:
             SemgridError: the row cannot be run; the message says why.
         """
-        scored = self._window_set(row, row.validation_split, validation_windows)
+        scored = self._window_set(row, row.validation_split, row.scored_window, validation_windows)
         windows_id = digest_value([scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
         training = self._training(row, seed) if seed is not None else None
-        counted = self._window_set(row, row.train_split, training_windows) if row.model == "table" else None
+        counted = self._window_set(row, row.train_split, row.window, training_windows) if row.model == "table" else None
         config = _config(row)
         learned_from = training.id if training else counted.digest() if counted is not None else None
         result_id = digest_value([results.FORMAT_VERSION, config, windows_id, learned_from])
@@ -90,14 +90,16 @@ class Worker:
         _keep_result(folder, record, evaluation, history, with_predictions=seed in (None, self._example_seed))
         return job.result_id
 
-    def _window_set(self, row: Row, split: str, plan: Callable[[list[int], WindowConfig], WindowPlan]) -> WindowSet:
+    def _window_set(
+        self, row: Row, split: str, config: WindowConfig, plan: Callable[[list[int], WindowConfig], WindowPlan]
+    ) -> WindowSet:
         data = self._sources.data(row.grid, split)
-        windows = plan(data.frame_counts, row.window).windows
+        windows = plan(data.frame_counts, config).windows
         return select_windows(data, windows, sensors=row.sensors, translate=row.translate)
 
     def _training(self, row: Row, seed: int) -> "Training":
-        windows = self._window_set(row, row.train_split, training_windows)
-        watched = self._window_set(row, row.validation_split, validation_windows)
+        windows = self._window_set(row, row.train_split, row.window, training_windows)
+        watched = self._window_set(row, row.validation_split, row.scored_window, validation_windows)
         training_id = digest_value(
             {
                 "network": row.network.model_dump(),

@@ -247,3 +247,12 @@ def test_two_logs_of_one_recording_are_refused(tmp_path):
         write_log(street(1, frames=9).recording("twin"), tmp_path / "logs" / f"{name}.mcap")
     with pytest.raises(InputError, match=r"b\.mcap and a\.mcap both hold twin"):
         run([{"name": "BL-DC", "model": "newest"}], tmp_path / "logs", tmp_path / "run")
+
+
+def test_recordings_of_another_frame_rate_are_scored_in_windows_of_their_own(logs, tmp_path):
+    rows = [{"name": "ED-DC", "model": "ed", "validation_window": {"step_frames": 2, "target_frame": None}}]
+    record = run(rows, logs, tmp_path / "run")
+    assert record.rows[0].failure is None
+    assert record.rows[0].step_frames == 2
+    result = results.read_result(results.result_folder(tmp_path / "run", record.rows[0].results[0]))
+    assert [window.target_frame for window in result.windows] == [4, 5, 6, 7, 8] * 2
