@@ -195,7 +195,7 @@ def _predictor(row: Row, trained: Trained | None, counted: WindowSet | None) -> 
 
 def _window_records(windows: WindowSet, log_of: dict[str, str]) -> tuple[results.WindowRecord, ...]:
     data = windows.data
-    frames = windows.target_frames.cpu().numpy()
+    frames, inputs = windows.target_frames.cpu().numpy(), windows.inputs.cpu().numpy()
     owners = np.searchsorted(data.first_frames, frames, side="right") - 1
     return tuple(
         results.WindowRecord(
@@ -203,8 +203,9 @@ def _window_records(windows: WindowSet, log_of: dict[str, str]) -> tuple[results
             log=log_of[data.recordings[owner]],
             target_frame=int(frame - data.first_frames[owner]),
             target_stamp_ns=int(data.stamps_ns[frame]),
+            input_stamps_ns=tuple(data.stamps_ns[past].tolist()),
         )
-        for frame, owner in zip(frames, owners, strict=True)
+        for frame, past, owner in zip(frames, inputs, owners, strict=True)
     )
 
 
