@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.report.reading import Row
+from semgrid_eval.scores.calibration import LEVELS, certainty_counts, expected_calibration_error, reliability
 from semgrid_eval.scores.iou import category_iou, class_iou
 from semgrid_eval.scores.results import read_arrays, windows_file
 
@@ -20,7 +21,6 @@ GRID_SIDE_M = 100.0
 BAND_EDGES_M = (20.0, 40.0, 60.0)
 BANDS = ("0 to 20 m", "20 to 40 m", "40 to 60 m", "beyond 60 m")
 ORIGINS = ("in the newest input", "in an older input only", "in no input")
-_LEVELS = 256
 _CHUNK = 64
 
 
@@ -43,23 +43,14 @@ class Where:
         total = known.sum(axis=(1, 2))
         return np.asarray(np.divide(right, total, out=np.full(len(ORIGINS), np.nan), where=total > 0))
 
-    def calibration(self, bins: int = 10) -> pd.DataFrame:
+    def calibration(self) -> pd.DataFrame:
         """Columns certainty, right, cells: mean certainty and share of right cells in each bin that has cells."""
-        levels = np.arange(_LEVELS)
-        place = np.minimum(levels * bins // (_LEVELS - 1), bins - 1)
-        total = self.certainty.sum(axis=1)
-        cells = np.bincount(place, total, bins)
-        right = np.bincount(place, self.certainty[:, 1], bins)
-        certainty = np.bincount(place, total * levels / (_LEVELS - 1), bins)
-        used = cells > 0
-        table = {"certainty": certainty[used] / cells[used], "right": right[used] / cells[used], "cells": cells[used]}
-        return pd.DataFrame(table).astype({"cells": "int64"})
+        table = pd.DataFrame(vars(reliability(self.certainty)))
+        return table[table.cells > 0].reset_index(drop=True)
 
     def calibration_error(self) -> float:
         """Mean distance between certainty and share of right cells, weighted by cells."""
-        table = self.calibration()
-        gap = (table.certainty - table.right).abs()
-        return float((gap * table.cells).sum() / table.cells.sum()) if len(table) else float("nan")
+        return expected_calibration_error(self.certainty)
 
 
 def locate_rows(rows: Iterable[Row]) -> tuple[list[Where], list[str]]:
@@ -89,11 +80,11 @@ def locate_row(row: Row) -> Where:
     if not target.shape == prediction.shape == certainty.shape == mask.shape:
         raise ValueError(f"shapes of windows {target.shape} and predictions {prediction.shape} differ")
     cells = np.zeros((len(BANDS), len(ORIGINS), CLASS_COUNT, CLASS_COUNT), np.int64)
-    levels = np.zeros((_LEVELS, 2), np.int64)
+    levels = np.zeros((LEVELS, 2), np.int64)
     for start in range(0, len(target), _CHUNK):
         part = slice(start, start + _CHUNK)
         cells += count_cells(inputs[part], target[part], prediction[part], mask[part])
-        levels += count_certainty(target[part], prediction[part], certainty[part], mask[part])
+        levels += certainty_counts(target[part], prediction[part], certainty[part], mask[part])
     return Where(row, cells, levels)
 
 
@@ -113,10 +104,3 @@ def count_cells(inputs: Grid, target: Grid, prediction: Grid, mask: NDArray[np.b
     index = (index * CLASS_COUNT + target) * CLASS_COUNT + prediction
     shape = (len(BANDS), len(ORIGINS), CLASS_COUNT, CLASS_COUNT)
     return np.asarray(np.bincount(index[~mask], minlength=int(np.prod(shape))).reshape(shape), np.int64)
-
-
-def count_certainty(target: Grid, prediction: Grid, certainty: Grid, mask: NDArray[np.bool_]) -> Counts:
-    """Count cells outside M that target or prediction know, by certainty: (N, H, W) each -> (256, wrong and right)."""
-    counted = ~mask & ((target != UNKNOWN) | (prediction != UNKNOWN))
-    index = certainty[counted].astype(np.int64) * 2 + (target == prediction)[counted]
-    return np.asarray(np.bincount(index, minlength=2 * _LEVELS).reshape(_LEVELS, 2), np.int64)

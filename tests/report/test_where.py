@@ -16,7 +16,6 @@ from semgrid_eval.report.where import (
     Where,
     bands_of,
     count_cells,
-    count_certainty,
     locate_row,
     locate_rows,
 )
@@ -51,16 +50,6 @@ def test_cells_are_counted_like_by_hand(inputs, target, prediction, mask):
     got = count_cells(inputs, target, prediction, mask)
     np.testing.assert_array_equal(got, expected)
     np.testing.assert_array_equal(got.sum(axis=(0, 1)), confusion(target, prediction, mask).sum(axis=0))
-
-
-@settings(max_examples=30)
-@given(GRIDS, GRIDS, arrays(np.uint8, SHAPE), MASKS)
-def test_certainty_counts_known_cells_only(target, prediction, certainty, mask):
-    expected = np.zeros((256, 2), int)
-    for at in np.ndindex(SHAPE):
-        if not mask[at] and (target[at] != UNKNOWN or prediction[at] != UNKNOWN):
-            expected[certainty[at], int(target[at] == prediction[at])] += 1
-    np.testing.assert_array_equal(count_certainty(target, prediction, certainty, mask), expected)
 
 
 def test_bands_grow_with_the_distance_from_the_bottom_middle():
