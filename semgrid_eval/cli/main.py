@@ -16,6 +16,7 @@ _COMMANDS = {
     "grids": "semgrid_eval.cli.grids",
     "run": "semgrid_eval.cli.run",
     "report": "semgrid_eval.cli.report",
+    "play": "semgrid_eval.cli.play",
     "demo": "semgrid_eval.cli.demo",
 }
 

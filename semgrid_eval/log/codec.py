@@ -146,13 +146,18 @@ def read_actors(data: bytes) -> tuple[int, tuple[Actor, ...]]:
     return stamp_ns(message.timestamp), tuple(boxes)
 
 
-def transforms_message(pose: Pose, calibrations: dict[str, CameraCalibration]) -> FrameTransforms:
-    """Write where vehicle, grid and cameras are when the vehicle stands at `pose` in the odom frame."""
+def transforms_message(
+    pose: Pose, calibrations: dict[str, CameraCalibration], *, grid_yaw_rad: float = 0.0
+) -> FrameTransforms:
+    """Write where vehicle, grid and cameras are when the vehicle stands at `pose` in the odom frame.
+
+    The grid never turns: it points to `grid_yaw_rad` in the odom frame.
+    """
     position = (pose.x_m, pose.y_m, 0.0)
     time = timestamp(pose.stamp_ns)
     transforms = [
         _transform(time, ODOM_FRAME, BASE_FRAME, position, _turned_by(pose.yaw_rad)),
-        _transform(time, ODOM_FRAME, GRID_FRAME, position, _turned_by(0.0)),
+        _transform(time, ODOM_FRAME, GRID_FRAME, position, _turned_by(grid_yaw_rad)),
     ]
     for camera, calibration in sorted(calibrations.items()):
         place = (calibration.x_m, calibration.y_m, calibration.z_m)

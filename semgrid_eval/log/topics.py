@@ -19,6 +19,12 @@ EGO_MOTION = "/ego/motion"
 TRUE_POSE = "/truth/pose"
 TRUE_ACTORS = "/truth/actors"
 
+GRID_TARGET = "/grid/target"
+GRID_MASK = "/grid/mask"
+GRID_CERTAINTY = "/grid/certainty"
+GRID_PREDICTION = "/grid/prediction"
+GRID_INPUT = "/grid/input"
+
 BASE_FRAME = "base_link"  # ISO 8855 vehicle frame: x forward, y left, z up, on the ground under the rear axle
 ODOM_FRAME = "odom"  # where the vehicle was, and pointed to, at the first sample
 GRID_FRAME = "grid"  # moves with the vehicle and never turns

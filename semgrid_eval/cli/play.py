@@ -1,0 +1,33 @@
+"""`semgrid-eval play`: the windows of a row as an MCAP log for viewers."""
+
+from pathlib import Path
+
+import click
+
+from semgrid_eval.cli.console import progress, say
+from semgrid_eval.runs.playback import write_playback
+
+
+@click.command("play", epilog="Example: semgrid-eval play runs/first BL-DC --out play.mcap --logs logs")
+@click.argument("run", metavar="RUN", type=click.Path(path_type=Path))
+@click.argument("row", metavar="ROW")
+@click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="The MCAP file to write.")
+@click.option("--logs", type=click.Path(path_type=Path), help="The run's logs: adds pictures and the vehicle's way.")
+@click.option("--recording", help="The recording to play.  [default: the first]")
+@click.option("--all", "every_recording", is_flag=True, help="Play all recordings, one after the other.")
+def command(run: Path, row: str, out: Path, logs: Path | None, recording: str | None, *, every_recording: bool) -> None:
+    """Write target, prediction, certainty, mask and inputs of a ROW's scored windows as an MCAP log.
+
+    Grids are foxglove.Grid messages, which Foxglove and Lichtblick draw, and beside them, under /exact, the class ids
+    as they are scored. Their time is the one predicted for, their publish time that of the last input. With --all,
+    recordings follow each other a second apart: the first keeps its times, those of the others are shifted. A layout
+    for the viewer is written beside the log. Prints the path of the log.
+    """
+    if every_recording and recording is not None:
+        raise click.UsageError("--recording names one recording, --all plays all of them")
+    with progress("play") as shown:
+        written = write_playback(
+            run, row, out, logs=logs, recording=recording, every_recording=every_recording, progress=shown
+        )
+    say(f"layout for Foxglove or Lichtblick: {written.layout}")
+    click.echo(written.log)

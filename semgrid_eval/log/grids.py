@@ -1,0 +1,130 @@
+"""Bird's-eye grids as messages: coloured for viewers, exact for programs."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from foxglove_schemas_protobuf.Grid_pb2 import Grid
+from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
+from foxglove_schemas_protobuf.Pose_pb2 import Pose
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
+from foxglove_schemas_protobuf.Vector2_pb2 import Vector2
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, MASK_COLOUR, UNKNOWN, class_palette
+from semgrid_eval.log.codec import timestamp
+from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
+from semgrid_eval.log.topics import GRID_FRAME
+
+Values = NDArray[np.uint8]
+_COLOURS = ("red", "green", "blue", "alpha")
+
+
+@dataclass(frozen=True)
+class GridPlace:
+    """Where a grid lies: edge of a cell, and the outer corner of cell (0, 0), ahead and left of the grid frame."""
+
+    cell_m: float
+    corner_x_m: float
+    corner_y_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class GridLayer:
+    """What the values of a grid mean.
+
+    Args:
+        field: name of the values.
+        rgba: (256, 4) sRGB and opacity by value.
+        names: by value.
+    """
+
+    field: str
+    rgba: Values
+    names: tuple[str, ...] = ()
+
+
+def _class_colours() -> Values:
+    rgba = np.zeros((256, 4), np.uint8)
+    rgba[:CLASS_COUNT, :3] = class_palette()
+    rgba[:CLASS_COUNT, 3] = 255
+    rgba[UNKNOWN, 3] = 0  # layers that are drawn over each other do not hide what another one knows
+    return rgba
+
+
+def _mask_colours() -> Values:
+    rgba = np.zeros((256, 4), np.uint8)
+    rgba[1] = (*MASK_COLOUR, 255)
+    return rgba
+
+
+def _grey_ramp() -> Values:
+    rgba = np.full((256, 4), 255, np.uint8)
+    rgba[:, :3] = np.arange(256)[:, None]
+    return rgba
+
+
+CLASSES = GridLayer("class_id", _class_colours(), CLASS_NAMES)
+MASK = GridLayer("masked", _mask_colours(), ("scored", "left_out"))
+CERTAINTY = GridLayer("certainty", _grey_ramp())
+"""Layers of grids: class ids, the mask M (1 = left out of scores), the highest score of a cell (255 = 1)."""
+
+
+def viewer_message(stamp_ns: int, values: Values, layer: GridLayer, place: GridPlace) -> Grid:
+    """Write a grid (H, W), row 0 farthest ahead and column 0 farthest left, coloured for viewers.
+
+    A foxglove.Grid begins at the corner with the smallest x and y; its columns go along x, its rows along y.
+    """
+    rows, columns = values.shape
+    along_x = values[::-1, ::-1].T  # (W, H): first row farthest right, first column nearest
+    cells = np.concatenate([layer.rgba[along_x], along_x[..., None]], axis=-1)  # (W, H, 5)
+    fields = (*_COLOURS, layer.field)
+    return Grid(
+        timestamp=timestamp(stamp_ns),
+        frame_id=GRID_FRAME,
+        pose=Pose(
+            position=Vector3(
+                x=place.corner_x_m - rows * place.cell_m, y=place.corner_y_m - columns * place.cell_m, z=0.0
+            ),
+            orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
+        ),
+        column_count=rows,
+        cell_size=Vector2(x=place.cell_m, y=place.cell_m),
+        row_stride=rows * len(fields),
+        cell_stride=len(fields),
+        fields=[
+            PackedElementField(name=name, offset=offset, type=PackedElementField.UINT8)
+            for offset, name in enumerate(fields)
+        ],
+        data=cells.tobytes(),
+    )
+
+
+def exact_message(stamp_ns: int, values: Values, layer: GridLayer, place: GridPlace) -> SemanticGrid:
+    """Write a grid (H, W) as it is scored."""
+    rows, columns = values.shape
+    return SemanticGrid(
+        timestamp=timestamp(stamp_ns),
+        frame_id=GRID_FRAME,
+        rows=rows,
+        columns=columns,
+        cell_size_m=place.cell_m,
+        corner_x_m=place.corner_x_m,
+        corner_y_m=place.corner_y_m,
+        class_ids=np.ascontiguousarray(values, np.uint8).tobytes(),
+        class_names=layer.names,
+    )
+
+
+def read_exact(data: bytes) -> tuple[Values, GridPlace]:
+    """Read the values (H, W) of an exact message, and where they lie.
+
+    Raises:
+        DecodeError: the message is damaged.
+        ValueError: it holds another number of cells than it tells.
+    """
+    message = SemanticGrid.FromString(data)
+    place = GridPlace(message.cell_size_m, message.corner_x_m, message.corner_y_m)
+    values: NDArray[Any] = np.frombuffer(message.class_ids, np.uint8)
+    return values.reshape(message.rows, message.columns), place
