@@ -35,7 +35,8 @@ for await (const message of reader.readMessages()) {
   }
   const type = types.get(schema.id);
   const value = type.toObject(type.decode(message.data), { longs: String });
-  messages.push({ topic: channel.topic, schema: schema.name, log_ns: message.logTime, value });
+  const times = { log_ns: message.logTime, publish_ns: message.publishTime };
+  messages.push({ topic: channel.topic, schema: schema.name, ...times, value });
 }
 const attachments = {};
 for await (const attachment of reader.readAttachments()) {
