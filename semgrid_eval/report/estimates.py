@@ -3,7 +3,7 @@
 Every row of a report is resampled with the same draws of recordings, so that differences between rows are paired.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -57,8 +57,14 @@ class RowScores:
 
     def minus(self, other: "RowScores", column: str) -> Estimate:
         """Give the paired difference to another row."""
-        at = COLUMNS.index(column)
-        return _estimate(self.mean[column] - other.mean[column], self.draws[:, at] - other.draws[:, at])
+        return weighted_sum([(1, self), (-1, other)], column)
+
+
+def weighted_sum(parts: Sequence[tuple[float, RowScores]], column: str) -> Estimate:
+    """Add up rows' scores by their weights, draw by draw."""
+    at = COLUMNS.index(column)
+    value = sum(weight * entry.mean[column] for weight, entry in parts)
+    return _estimate(value, np.sum([weight * entry.draws[:, at] for weight, entry in parts], axis=0))
 
 
 def score_columns(counts: Counts) -> Array:

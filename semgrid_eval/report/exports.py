@@ -13,9 +13,11 @@ from semgrid_eval.report.cells import ABSENT
 from semgrid_eval.report.comparison import reference_of
 from semgrid_eval.report.estimates import CATEGORY_COLUMNS, COLUMNS, DRAWS, LEVEL, Estimate, RowScores
 from semgrid_eval.report.figure import Plot
+from semgrid_eval.report.findings import Finding, finding_frame, finding_records
 from semgrid_eval.report.longform import category_table, class_table
 from semgrid_eval.report.provenance import failures
 from semgrid_eval.report.reading import Run
+from semgrid_eval.report.regions import region_frame
 from semgrid_eval.report.tables import LABELS
 from semgrid_eval.report.where import BANDS, ORIGINS, Where
 
@@ -33,15 +35,23 @@ _LATEX = str.maketrans(
 Scores = Mapping[str, RowScores]
 
 
-def write_tables(folder: Path, runs: Sequence[Run], scores: Scores) -> None:
-    """Write classes.csv, categories.csv, summary.csv, summary.md, summary.tex and report.json."""
+def write_tables(
+    folder: Path,
+    runs: Sequence[Run],
+    scores: Scores,
+    regions: Mapping[str, Scores],
+    findings: Sequence[Finding],
+) -> None:
+    """Write classes, categories, summary, regions and findings as CSV, summary.md, summary.tex and report.json."""
     entries = list(scores.values())
     _write_csv(folder / "classes.csv", class_table(entries))
     _write_csv(folder / "categories.csv", category_table(entries))
     _write_csv(folder / "summary.csv", summary_table(scores))
+    _write_csv(folder / "regions.csv", region_frame(regions))
+    _write_csv(folder / "findings.csv", finding_frame(findings))
     write_text(folder / "summary.md", markdown_table(scores))
     write_text(folder / "summary.tex", latex_table(scores))
-    write_json(folder / RECORD, report_record(runs, scores))
+    write_json(folder / RECORD, report_record(runs, scores, regions, findings))
 
 
 def write_located(folder: Path, located: Sequence[Where]) -> None:
@@ -95,9 +105,10 @@ def latex_table(scores: Scores) -> str:
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""]).replace(ABSENT, "--")
 
 
-def report_record(runs: Sequence[Run], scores: Scores) -> dict[str, Any]:
+def report_record(
+    runs: Sequence[Run], scores: Scores, regions: Mapping[str, Scores], findings: Sequence[Finding]
+) -> dict[str, Any]:
     """Return everything a machine may want to know of a report; absent values are null."""
-    rows = [entry.row for entry in scores.values()]
     return {
         "format_version": FORMAT_VERSION,
         "semgrid_eval": __version__,
@@ -107,8 +118,15 @@ def report_record(runs: Sequence[Run], scores: Scores) -> dict[str, Any]:
             for run in runs
         ],
         "failures": [vars(failure) for failure in failures(runs)],
-        "rows": {name: _row_record(entry, scores, rows) for name, entry in scores.items()},
+        "rows": _row_records(scores),
+        "regions": {name: _row_records(near) for name, near in regions.items()},
+        "findings": finding_records(findings),
     }
+
+
+def _row_records(scores: Scores) -> dict[str, Any]:
+    rows = [entry.row for entry in scores.values()]
+    return {name: _row_record(entry, scores, rows) for name, entry in scores.items()}
 
 
 def _row_record(entry: RowScores, scores: Scores, rows: Sequence[Any]) -> dict[str, Any]:

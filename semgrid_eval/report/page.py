@@ -1,6 +1,7 @@
 """Writes a report: one self-contained page, tables for people and for machines, and figures."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
@@ -16,13 +17,16 @@ from semgrid_eval.progress import Progress, silent
 from semgrid_eval.report import diagrams, exports, plots, provenance, tables
 from semgrid_eval.report.cells import Table
 from semgrid_eval.report.changes import changes_table
+from semgrid_eval.report.claims import MARGIN
 from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, Headline, headline
 from semgrid_eval.report.estimates import RowScores, score_rows
 from semgrid_eval.report.examples import choose, choose_by_class, contests
 from semgrid_eval.report.figure import Plot
+from semgrid_eval.report.findings import Finding, find, finding_table, missing_table, sentence
 from semgrid_eval.report.panels import Group, example_group
 from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.reading import Row, Run, load_runs
+from semgrid_eval.report.regions import region_tables, score_regions
 from semgrid_eval.report.summary import summarise
 from semgrid_eval.report.where import Where, locate_rows
 
@@ -31,6 +35,29 @@ _SEED = 20190623  # any number does; a fixed one gives the same run the same int
 _BEST, _WORST, _OTHER = 3, 3, 1
 
 Scores = Mapping[str, RowScores]
+
+
+@dataclass(frozen=True)
+class Material:
+    """All that a report is written from.
+
+    Args:
+        runs: the runs as read from disk.
+        scores: scores of all rows that have some.
+        regions: the same of cells near moving and near standing actors alone.
+        findings: what the runs say about the paper's claims.
+        located: where rows are right.
+        problems: of which rows that cannot be said, and why.
+        figures: by section of the page.
+    """
+
+    runs: Sequence[Run]
+    scores: Scores
+    regions: Mapping[str, Scores]
+    findings: Sequence[Finding]
+    located: Sequence[Where]
+    problems: Sequence[str]
+    figures: Mapping[str, Sequence[Plot]]
 
 
 def write_report(run: Path | Sequence[Path], out: Path | None = None, *, progress: Progress = silent) -> Path:
@@ -49,17 +76,23 @@ def write_report(run: Path | Sequence[Path], out: Path | None = None, *, progres
         raise InputError("no run is given", field="run")
     out = folders[0] / "report" if out is None else out
     _check_replaceable(out)
-    runs = load_runs(folders, progress=progress)
+    material = gather(load_runs(folders, progress=progress))
+    with atomic_folder(out) as folder:
+        exports.write_tables(folder, material.runs, material.scores, material.regions, material.findings)
+        exports.write_located(folder, material.located)
+        exports.write_figures(folder, material.figures)
+        (folder / PAGE).write_text(render_page(material), encoding="utf-8")
+    return out / PAGE
+
+
+def gather(runs: Sequence[Run]) -> Material:
+    """Work out everything that a report shows."""
     rows = [row for each in runs for row in each.rows]
     scores = score_rows(rows, np.random.default_rng(_SEED))
+    regions = score_regions(rows, _SEED)
     located, problems = locate_rows(entry.row for entry in scores.values())
     figures = draw_figures(scores, rows, located)
-    with atomic_folder(out) as folder:
-        exports.write_tables(folder, runs, scores)
-        exports.write_located(folder, located)
-        exports.write_figures(folder, figures)
-        (folder / PAGE).write_text(render_page(runs, scores, figures, located, problems), encoding="utf-8")
-    return out / PAGE
+    return Material(runs, scores, regions, find(runs, scores, regions), located, problems, figures)
 
 
 def draw_figures(scores: Scores, rows: Sequence[Row], located: Sequence[Where]) -> dict[str, list[Plot]]:
@@ -74,14 +107,9 @@ def draw_figures(scores: Scores, rows: Sequence[Row], located: Sequence[Where]) 
     }
 
 
-def render_page(
-    runs: Sequence[Run],
-    scores: Scores,
-    figures: Mapping[str, Sequence[Plot]],
-    located: Sequence[Where],
-    problems: Sequence[str],
-) -> str:
+def render_page(material: Material) -> str:
     """Render the page as HTML that needs nothing but itself."""
+    runs, scores = material.runs, material.scores
     found = headline(scores)
     environment = Environment(
         loader=PackageLoader("semgrid_eval.report"),
@@ -98,10 +126,12 @@ def render_page(
         runs=runs,
         title=", ".join(each.record.title for each in runs),
         summary=summarise(runs, scores, found),
-        tables=page_tables(runs, scores) | tables.where_tables(located),
+        tables=page_tables(runs, scores) | tables.where_tables(material.located) | region_tables(material.regions),
+        findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
+        margin=MARGIN,
         confusions=confusion_tables(scores, found),
-        problems=problems,
-        figures=figures,
+        problems=material.problems,
+        figures=material.figures,
         legend=(*CLASS_LEGEND, MASK_LEGEND),
         right_legend=RIGHT_LEGEND,
         examples=example_groups([entry.row for entry in scores.values()], found),
@@ -124,6 +154,17 @@ def page_tables(runs: Sequence[Run], scores: Scores) -> dict[str, Table | None]:
         "windows": tables.window_means(scores),
         "runs": tables.run_differences(scores, [each.tag for each in runs], DIFFERENCE_COLUMNS),
         "costs": tables.training_table(list(scores.values())),
+    }
+
+
+def finding_view(tag: str, index: int, findings: Sequence[Finding]) -> dict[str, object]:
+    """Make what the page shows of one run's findings."""
+    mine = [each for each in findings if each.run == tag]
+    return {
+        "tag": tag,
+        "sentence": sentence(mine),
+        "tested": finding_table(f"findings-{index}" if index else "findings", mine),
+        "missing": missing_table(f"not-run-{index}" if index else "not-run", mine),
     }
 
 

@@ -51,14 +51,11 @@ def facts(run: Run) -> Facts:
 
 
 def log_table(runs: Sequence[Run]) -> Table:
-    """List the logs with their digests."""
-    logs = {(log.name, log.digest): log for run in runs for log in run.record.logs}
-    bodies = tuple(
-        (Line(log.name, (Cell(log.dataset), Cell(log.split), Cell(log.path), Cell(log.digest))),)
-        for log in logs.values()
-    )
-    columns = tuple((text, "") for text in ("Data set", "Split", "Path", "Digest"))
-    return Table("logs", "Logs that took part", "Log", columns, bodies)
+    """List the logs by their paths, which example windows name, too, with their digests."""
+    logs = {(log.path, log.digest): log for run in runs for log in run.record.logs}
+    bodies = tuple((Line(log.path, (Cell(log.dataset), Cell(log.split), Cell(log.digest))),) for log in logs.values())
+    columns = tuple((text, "") for text in ("Data set", "Split", "Digest"))
+    return Table("logs", "Logs that took part, by their paths below the folder of logs", "Log", columns, bodies)
 
 
 def result_table(runs: Sequence[Run]) -> Table:

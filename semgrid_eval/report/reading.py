@@ -1,6 +1,6 @@
 """Reads a run's result files; what cannot be read becomes a failure of its row, and the rest goes on."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from semgrid_eval.scores.results import (
     RunRecord,
     read_counts,
     read_history,
+    read_region_counts,
     read_result,
     read_run,
     result_folder,
@@ -25,10 +26,14 @@ from semgrid_eval.scores.results import (
 
 @dataclass(frozen=True)
 class Result:
-    """One readable result: its record, the counts (N, C, C) of its windows and its training history."""
+    """One readable result: its record, the counts (N, C, C) of its windows and its training history.
+
+    `regions` holds the counts near moving and near standing actors alone; it is empty where no log has the truth.
+    """
 
     record: ResultRecord
     counts: NDArray[np.int32]
+    regions: Mapping[str, NDArray[np.int32]]
     history: pd.DataFrame | None
     folder: Path
 
@@ -117,4 +122,5 @@ def _load_result(folder: Path) -> Result:
         raise ValueError(f"{folder / 'counts.npz'}: {len(counts)} windows, but result.json has {len(record.windows)}")
     if counts.min(initial=0) < 0 or counts.sum(axis=(1, 2)).max(initial=0) > np.iinfo(np.int32).max // CLASS_COUNT:
         raise ValueError(f"{folder / 'counts.npz'}: counts are negative or beyond any grid")
-    return Result(record, counts.astype(np.int32), read_history(folder), folder)
+    regions = {name: near.astype(np.int32) for name, near in read_region_counts(folder).items()}
+    return Result(record, counts.astype(np.int32), regions, read_history(folder), folder)

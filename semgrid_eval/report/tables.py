@@ -49,10 +49,10 @@ LABELS = {
 }
 
 
-def value_table(name: str, caption: str, scores: Scores, columns: Sequence[str]) -> Table:
+def value_table(name: str, caption: str, scores: Scores, columns: Sequence[str], *, beside_paper: bool = True) -> Table:
     """Show the columns of every row, the best of each marked, beside the paper's values where it has them."""
     best = {column: _best(scores, column) for column in columns}
-    bodies = tuple(_value_body(entry, best) for entry in scores.values())
+    bodies = tuple(_value_body(entry, best, beside_paper=beside_paper) for entry in scores.values())
     return Table(name, caption, "Row", _headers(scores, columns), bodies)
 
 
@@ -119,13 +119,13 @@ def run_differences(scores: Scores, tags: Sequence[str], columns: Sequence[str])
     return Table("runs", caption, "Rows", _headers(scores, columns), tuple(bodies)) if bodies else None
 
 
-def _value_body(entry: RowScores, best: Mapping[str, float]) -> tuple[Line, ...]:
+def _value_body(entry: RowScores, best: Mapping[str, float], *, beside_paper: bool) -> tuple[Line, ...]:
     values = tuple(
         value_cell(entry.estimate(name), title=_evidence(entry, name), best=entry.mean[name] == best[name])
         for name in best
     )
     lines = [Line(entry.row.name, values, title=entry.row.record.label)]
-    paper = paper_table().get(entry.row.record.name, {})
+    paper = paper_table().get(entry.row.record.name, {}) if beside_paper else {}
     if set(best) <= set(paper):
         lines.append(Line("paper", tuple(plain_cell(paper[name]) for name in best), "paper"))
         gaps = (entry.mean[name] - paper[name] for name in best)

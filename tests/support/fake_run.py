@@ -52,12 +52,16 @@ def make_fake_run(
     windows: int = 2,
     title: str = "Town, small",
     prefix: str = "town",
+    truth: bool = True,
 ) -> Path:
-    """Write a run with `windows` windows for each of `recordings` recordings and return its folder."""
-    made = _Maker(run, [f"{prefix}_{i:03d}" for i in range(recordings)], windows)
+    """Write a run with `windows` windows for each of `recordings` recordings and return its folder.
+
+    With `truth`, results hold the counts near moving and near standing cars apart.
+    """
+    made = _Maker(run, [f"{prefix}_{i:03d}" for i in range(recordings)], windows, truth)
     records = tuple(made.row(row) for row in rows)
     logs = tuple(
-        results.LogRecord(name=n, path=f"logs/{n}.mcap", digest=digest_value(n), split="val", dataset="synthetic")
+        results.LogRecord(name=n, path=_log(n), digest=digest_value(n), split="val", dataset="synthetic")
         for n in made.names
     )
     results.write_run(
@@ -80,10 +84,10 @@ def make_fake_run(
 
 
 class _Maker:
-    def __init__(self, run: Path, names: list[str], windows: int) -> None:
+    def __init__(self, run: Path, names: list[str], windows: int, truth: bool) -> None:
         self.run, self.names = run, names
         self.records = tuple(
-            results.WindowRecord(recording=n, log=n, target_frame=20 + k, target_stamp_ns=(20 + k) * FRAME_NS)
+            results.WindowRecord(recording=n, log=_log(n), target_frame=20 + k, target_stamp_ns=(20 + k) * FRAME_NS)
             for n in names
             for k in range(windows)
         )
@@ -91,6 +95,8 @@ class _Maker:
         self.past = np.array([s[0] for s in scenes], np.uint8).reshape(-1, 2, SIDE, SIDE)
         self.target = np.array([s[1] for s in scenes], np.uint8).reshape(-1, SIDE, SIDE)
         self.truth = np.array([s[2] for s in scenes], np.uint8).reshape(-1, SIDE, SIDE)
+        near = np.array([s[3] for s in scenes], bool).reshape(-1, 2, SIDE, SIDE)
+        self.regions = dict(zip(results.REGIONS, near.swapaxes(0, 1), strict=True)) if truth else {}
         self.mask = (self.past != UNKNOWN).any(1) & (self.target == UNKNOWN)
 
     def row(self, row: FakeRow) -> results.RowRecord:
@@ -138,7 +144,8 @@ class _Maker:
         result_id = digest_value([config, seed, self.names])
         folder = results.result_folder(self.run, result_id)
         results.write_arrays(folder / "predictions.npz", {"prediction": prediction, "certainty": certainty})
-        results.write_arrays(folder / "counts.npz", {"counts": confusion(self.target, prediction, self.mask)})
+        near = {name: confusion(self.target, prediction, self.mask | ~region) for name, region in self.regions.items()}
+        results.write_counts(folder, confusion(self.target, prediction, self.mask), near)
         if trained:
             (folder / "history.csv").write_text(_history(seed, row.wrong))
         record = results.ResultRecord(
@@ -166,8 +173,12 @@ def _history(seed: int, wrong: float) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _scene(rng: np.random.Generator, step: int) -> tuple[list[Grid], Grid, Grid]:
-    """Two aligned inputs, the target as the sensor sees it, and the world behind it."""
+def _log(name: str) -> str:
+    return f"val/{name}.mcap"
+
+
+def _scene(rng: np.random.Generator, step: int) -> tuple[list[Grid], Grid, Grid, list[NDArray[np.bool_]]]:
+    """Two aligned inputs, the target as the sensor sees it, the world behind it, and where cars moved and stood."""
     world = _street(rng)
     cars = [(int(rng.integers(10, 100)), int(rng.choice([-6, -3, 2, 5])), int(rng.integers(-5, 6))) for _ in range(5)]
     frames = [_with_cars(world, cars, when + step) for when in (-2, -1, 0)]
@@ -175,7 +186,9 @@ def _scene(rng: np.random.Generator, step: int) -> tuple[list[Grid], Grid, Grid]
         np.where(_view(rng, back), frame, UNKNOWN).astype(np.uint8)
         for frame, back in zip(frames, (10, 5, 0), strict=True)
     ]
-    return [_flicker(rng, s) for s in seen[:2]], _flicker(rng, seen[2]), frames[2]
+    inputs, target = [_flicker(rng, s) for s in seen[:2]], _flicker(rng, seen[2])
+    moving = _near_cars([car for car in cars if car[2] != 0], step)
+    return inputs, target, frames[2], [moving, _near_cars([car for car in cars if car[2] == 0], step) & ~moving]
 
 
 def _street(rng: np.random.Generator) -> Grid:
@@ -201,6 +214,15 @@ def _with_cars(world: Grid, cars: list[tuple[int, int, int]], when: int) -> Grid
         top, left = max(0, row + speed * when), 64 + offset
         frame[top : top + 6, left : left + 3] = ID["large_vehicle" if index == 4 else "car"]
     return frame
+
+
+def _near_cars(cars: list[tuple[int, int, int]], when: int) -> NDArray[np.bool_]:
+    """The cells within one of a car's place at the target's time, or at the newest input's."""
+    near = np.zeros((SIDE, SIDE), bool)
+    for row, offset, speed in cars:
+        for top in (max(0, row + speed * when), max(0, row + speed * (when - 1))):
+            near[max(0, top - 1) : top + 7, 63 + offset : 68 + offset] = True
+    return near
 
 
 def _view(rng: np.random.Generator, back: int) -> NDArray[np.bool_]:

@@ -3,7 +3,7 @@
   const value = (body, column) => {
     const cell = body.rows[0].cells[column];
     if (column === 0) return cell.textContent.trim();
-    return cell.dataset.sort === undefined ? (/\d/.test(cell.textContent) ? cell.textContent.trim() : null) : Number(cell.dataset.sort);
+    return cell.dataset.sort === undefined ? (/[\p{L}\d]/u.test(cell.textContent) ? cell.textContent.trim() : null) : Number(cell.dataset.sort);
   };
 
   const compare = (a, b) => {

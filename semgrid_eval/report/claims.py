@@ -1,0 +1,152 @@
+"""The paper's claims as named comparisons between rows, and the same claims against stronger baselines."""
+
+import itertools
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+MARGIN = 0.02
+"""IoU: differences within it count as close, and a loss within it as none."""
+WINDOW_MS = "window_ms"
+"""The score of a check that compares the time of a prediction."""
+
+Rule = Literal["better", "close", "at least", "slower"]
+Pair = tuple[str, str]
+
+_LARGE = ("static_known", "vehicles")
+_SMALL = ("small_static", "small_dynamic")
+_MEAN = "mean_known"
+_BASELINES = ("BL-DC", "BL-Fuse", "BL-Table", "BL-Flow")
+_HORIZONS = ("DC", "PH1", "PH2", "PH3")
+_BUILD = re.compile(r"ED-d(\d+)-f(\d+)")
+_DEFAULT_ENDS = {"deeper": ("ED-d4-f64", "ED-d2-f64"), "wider": ("ED-d3-f64", "ED-d3-f16")}
+
+
+@dataclass(frozen=True)
+class Check:
+    """One comparison: the mean over pairs of the first row's score minus the second's.
+
+    Args:
+        pairs: names of rows.
+        score: a column of scores, or `WINDOW_MS`.
+        rule: what has to hold of the difference and its interval.
+        over: a pair whose difference is taken off, where leads are compared.
+        region: `moving` where only the cells near moving actors count.
+    """
+
+    pairs: tuple[Pair, ...]
+    score: str
+    rule: Rule = "better"
+    over: Pair | None = None
+    region: str = ""
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """The weight of each row's score."""
+        weights = {
+            name: sign / len(self.pairs) for pair in self.pairs for sign, name in zip((1, -1), pair, strict=True)
+        }
+        return weights | ({} if self.over is None else {self.over[0]: -1.0, self.over[1]: 1.0})
+
+    @property
+    def text(self) -> str:
+        """The comparison in names of rows."""
+        texts = [f"{first} \N{MINUS SIGN} {second}" for first, second in self.pairs]
+        if self.over is not None:
+            return f"({texts[0]}) \N{MINUS SIGN} ({self.over[0]} \N{MINUS SIGN} {self.over[1]})"
+        return texts[0] if len(texts) == 1 else f"mean of {', '.join(texts)}"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim: its name, what it says, and the comparisons that all have to hold."""
+
+    name: str
+    text: str
+    checks: tuple[Check, ...]
+
+
+def claims(rows: Iterable[str]) -> tuple[Claim, ...]:
+    """List the claims; which networks stand for deeper and wider depends on the names of the rows at hand."""
+    return (
+        *(claim for baseline in _BASELINES for claim in _over(baseline)),
+        *_without_translation(),
+        *_several_sensors(),
+        Claim(
+            "third-input",
+            f"With a third input, ED-SL3 is at least equal to ED-SL2 (at most {MARGIN} IoU below)",
+            _each((*_LARGE, *_SMALL), ("ED-SL3", "ED-SL2"), rule="at least"),
+        ),
+        *_horizons(),
+        *_builds([(name, int(found[1]), int(found[2])) for name in rows if (found := _BUILD.fullmatch(name))]),
+    )
+
+
+def _over(baseline: str) -> tuple[Claim, ...]:
+    pair = ("ED-DC", baseline)
+    small = f"ED-DC is at least equal to {baseline} on small classes (at most {MARGIN} IoU below)"
+    return (
+        Claim(
+            f"large-{baseline}", f"ED-DC is better than {baseline} on static classes and vehicles", _each(_LARGE, pair)
+        ),
+        Claim(
+            f"moving-{baseline}",
+            f"ED-DC is better than {baseline} on moving vehicles alone",
+            (Check((pair,), "vehicles", region="moving"),),
+        ),
+        Claim(f"small-{baseline}", small, _each(_SMALL, pair, rule="at least")),
+    )
+
+
+def _without_translation() -> tuple[Claim, ...]:
+    close = f"Without translated inputs, ED-NT is close to ED-DC on static classes and vehicles (within {MARGIN} IoU)"
+    return (
+        Claim("untranslated-large", close, _each(_LARGE, ("ED-NT", "ED-DC"), rule="close")),
+        Claim("untranslated-small", "ED-NT falls behind ED-DC on small classes", _each(_SMALL, ("ED-DC", "ED-NT"))),
+    )
+
+
+def _several_sensors() -> tuple[Claim, ...]:
+    good = f"Fusing two sensors, ED-Sp1 is as good as ED-DC with one (within {MARGIN} IoU)"
+    lead = f"ED-Sp2 is as far above BL-Sp2 as ED-DC above BL-DC, or farther (at most {MARGIN} IoU less)"
+    far, near = ("ED-Sp2", "BL-Sp2"), ("ED-DC", "BL-DC")
+    static = Check((far,), "static_known", over=near)
+    return (
+        Claim("two-sensors", good, _each((*_LARGE, *_SMALL), ("ED-Sp1", "ED-DC"), rule="close")),
+        Claim("blind-band", "With a blind band, ED-Sp2 is below ED-DC", (Check((("ED-DC", "ED-Sp2"),), _MEAN),)),
+        Claim("blind-band-lead", lead, (Check((far,), _MEAN, "at least", over=near),)),
+        Claim(
+            "blind-band-static", "On static classes, ED-Sp2's lead over its baseline is larger than ED-DC's", (static,)
+        ),
+    )
+
+
+def _horizons() -> tuple[Claim, ...]:
+    falls = tuple(Check(((f"ED-{sooner}", f"ED-{later}"),), _MEAN) for sooner, later in itertools.pairwise(_HORIZONS))
+    stays = [_each(_LARGE, (f"ED-{horizon}", f"BL-{horizon}")) for horizon in _HORIZONS[1:]]
+    above = "At longer horizons, ED stays better than its baseline on static classes and vehicles"
+    return (
+        Claim("horizon-falls", "ED's scores fall with the horizon", falls),
+        Claim("horizon-lead", above, tuple(check for checks in stays for check in checks)),
+    )
+
+
+def _builds(builds: list[tuple[str, int, int]]) -> tuple[Claim, ...]:
+    """Compare the deepest with the shallowest networks of equal width, and the widest with the narrowest alike."""
+    found = []
+    for kind, varied, fixed in (("deeper", 1, 2), ("wider", 2, 1)):
+        groups: dict[object, list[tuple[str, int, int]]] = {}
+        for build in builds:
+            groups.setdefault(build[fixed], []).append(build)
+        ends = [(max(g, key=lambda b: b[varied]), min(g, key=lambda b: b[varied])) for g in groups.values()]
+        pairs = tuple((first[0], last[0]) for first, last in ends if first != last) or (_DEFAULT_ENDS[kind],)
+        found += [
+            Claim(f"{kind}-better", f"A {kind} network is better", (Check(pairs, _MEAN),)),
+            Claim(f"{kind}-slower", f"A {kind} network is slower", (Check(pairs, WINDOW_MS, "slower"),)),
+        ]
+    return tuple(found)
+
+
+def _each(scores: Iterable[str], pair: Pair, *, rule: Rule = "better") -> tuple[Check, ...]:
+    return tuple(Check((pair,), score, rule) for score in scores)
