@@ -152,8 +152,10 @@ def finding_records(findings: Sequence[Finding]) -> list[dict[str, Any]]:
 def _by_record(scores: Scores, run: Path) -> dict[str, RowScores]:
     """Find a run's rows by the names that presets give them: the row's own name, else its model and experiment."""
     mine = [entry for entry in scores.values() if entry.row.run == run]
-    by_kind = {f"{entry.row.record.model}-{entry.row.record.experiment}": entry for entry in reversed(mine)}
-    return by_kind | {entry.row.record.name: entry for entry in mine}
+    found = {entry.row.record.name: entry for entry in mine}
+    for entry in mine:
+        found.setdefault(f"{entry.row.record.model}-{entry.row.record.experiment}", entry)
+    return found
 
 
 def _outcome(check: Check, places: Mapping[str, Scores]) -> Outcome:

@@ -43,6 +43,18 @@ def test_the_record_for_machines_has_scores_differences_and_failures(page):
     assert record["runs"][0]["record"]["logs"][0]["digest"]
 
 
+def test_findings_and_regions_are_there_for_machines(page):
+    record = read_json(page.parent / "report.json")
+    finding = next(each for each in record["findings"] if each["name"] == "moving-BL-DC")
+    (check,) = finding["checks"]
+    ours = record["regions"]["moving"]["ED-DC"]["differences"]["vehicles"]
+    assert {"value": check["difference"], "low": check["low"], "high": check["high"]} == ours
+    assert next(each for each in record["findings"] if each["verdict"] == "not run")["checks"][0]["low"] is None
+    table = pd.read_csv(page.parent / "regions.csv")
+    line = table[(table.region == "moving") & (table.row == "ED-DC") & (table.score == "vehicles")]
+    assert line.difference.item() == pytest.approx(ours["value"], abs=1e-6)
+
+
 def test_the_papers_table_is_complete():
     table = paper_table()
     assert len(table) == 18

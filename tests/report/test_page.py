@@ -84,8 +84,37 @@ def test_the_page_needs_no_network(page):
 def test_three_example_windows_and_their_traces_are_shown(page):
     found = _read(page)
     assert [a["class"] for a in found.all("article")].count("window") >= 3
-    for words in ("Input 1 of 2", "Target", "BL-NT", "Certainty", "frame 20", "log town_00"):
+    for words in ("Input 1 of 2", "Target", "BL-NT", "Certainty", "frame 20", "log val/town_00"):
         assert words in found.text
+
+
+def test_each_sensors_newest_input_is_shown(page):
+    titles = [image["alt"] for image in _read(page).all("img")]
+    for sensor in ("lower", "upper"):
+        assert f"Input 2 of 2, {sensor}, aligned to the target" in titles
+
+
+def test_a_windows_log_is_listed_under_the_same_name(page):
+    found = _read(page)
+    assert found.words.count("val/town_000.mcap") > 1
+
+
+def test_findings_stand_behind_the_classes_and_count_their_verdicts(page):
+    found = _read(page)
+    titles = [a["id"] for a in found.all("section")]
+    assert titles[titles.index("classes") + 1 :][:2] == ["findings", "moving"]
+    assert "Of 25 claims, 9 can be tested here: 4 hold, 2 do not, 3 are open." in found.text
+    assert "ED-DC is better than BL-DC on static classes and vehicles does not hold" in found.text
+    assert "ED-DC is better than BL-DC on moving vehicles alone holds" in found.text
+    assert "ED-NT falls behind ED-DC on small classes ED-NT" in found.text  # its row failed, so it stands as a need
+
+
+def test_without_truth_the_page_says_that_moving_and_standing_cannot_be_told_apart(tmp_path):
+    page = _report_of(tmp_path, rows=(FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 1)), truth=False)
+    assert "No result here knows the truth about actors" in _read(page).text
+    assert pd.read_csv(page.parent / "regions.csv").empty
+    findings = pd.read_csv(page.parent / "findings.csv").set_index("name")
+    assert findings.missing["moving-BL-DC"] == "logs that tell where true actors move"
 
 
 def test_failures_and_provenance_are_told(page):

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_NAMES, UNKNOWN
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
 from semgrid_eval.files import digest_value
+from semgrid_eval.report.reading import Result, Row
 from semgrid_eval.scores import results
 from semgrid_eval.scores.iou import confusion
 
@@ -81,6 +82,60 @@ def make_fake_run(
         ),
     )
     return run
+
+
+def counted_row(
+    name: str,
+    hits: dict[str, list[int]],
+    *,
+    near: dict[str, dict[str, list[int]]] | None = None,
+    window_ms: float = 10.0,
+    cells: int = 100,
+) -> Row:
+    """Make a row of one window a recording whose IoU of a class is `hits / cells` in each, misses being unknown.
+
+    `near` gives the hits in regions alike.
+    """
+    counts = _hit_counts(hits, cells)
+    windows = tuple(
+        results.WindowRecord(recording=f"town_{i}", log=_log(f"town_{i}"), target_frame=20, target_stamp_ns=i)
+        for i in range(len(counts))
+    )
+    record = results.ResultRecord(
+        format_version=results.FORMAT_VERSION,
+        id=digest_value(name),
+        config={},
+        log_digests=(),
+        seed=None,
+        windows_id="",
+        windows=windows,
+        device="cpu",
+        train_seconds=None,
+        predict_seconds=window_ms * len(windows) / 1000,
+        parameters=None,
+    )
+    model, experiment = name.split("-", 1)
+    row = results.RowRecord(
+        name=name,
+        experiment=experiment,
+        model=model,
+        label=name,
+        inputs=2,
+        step_frames=5,
+        horizon_steps=1,
+        sensors=("front",),
+        translate=True,
+    )
+    regions = {region: _hit_counts(each, cells) for region, each in (near or {}).items()}
+    return Row(name, row, (Result(record, counts, regions, None, Path()),), (), Path())
+
+
+def _hit_counts(hits: dict[str, list[int]], cells: int) -> NDArray[np.int32]:
+    counts = np.zeros((len(next(iter(hits.values()))), CLASS_COUNT, CLASS_COUNT), np.int32)
+    for name, numbers in hits.items():
+        counts[:, ID[name], ID[name]] = numbers
+        counts[:, ID[name], UNKNOWN] = cells - np.array(numbers)
+    return counts
 
 
 class _Maker:
