@@ -1,7 +1,10 @@
 """Named arrays on disk: compressed npz files with bounded sizes, nothing pickled, equal arrays giving equal bytes."""
 
 import io
+import struct
+import tokenize
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +15,21 @@ from semgrid_eval.errors import ResultError
 from semgrid_eval.files import atomic_file
 
 _ARRAY_LIMIT_BYTES = 8 << 30
+# All that zipfile and numpy were seen to raise on damaged files.
+_DAMAGE = (
+    OSError,
+    ValueError,
+    EOFError,
+    TypeError,
+    RuntimeError,  # NotImplementedError, too: an unknown compression
+    SyntaxError,
+    MemoryError,
+    OverflowError,
+    struct.error,
+    zlib.error,
+    zipfile.BadZipFile,
+    tokenize.TokenError,
+)
 
 
 def write_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
@@ -37,8 +55,9 @@ def read_arrays(path: Path, names: tuple[str, ...], *, optional: tuple[str, ...]
         if size > _ARRAY_LIMIT_BYTES:
             raise ResultError(f"would need {size >> 20} MiB", path=path)
         with np.load(path, allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in (*names, *(name for name in optional if name in arrays))}
-    except KeyError as error:
-        raise ResultError(f"has no array {error}", path=path) from error
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            for name in names:
+                if name not in arrays:
+                    raise ResultError(f"has no array {name}", path=path)
+            return {name: arrays[name] for name in (*names, *optional) if name in arrays}
+    except _DAMAGE as error:
         raise ResultError(f"cannot be read: {error}", path=path) from error

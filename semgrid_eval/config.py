@@ -1,6 +1,7 @@
 """Strict, frozen configuration: an unknown key or impossible value is an error naming file, place and allowed keys."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,6 +19,32 @@ class Config(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
 
+class _StrictLoader(yaml.SafeLoader):
+    """YAML 1.2's plain values (`off` is a word, `1e-4` a number) and no aliases.
+
+    An alias can make a short file expand beyond all memory.
+    """
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            raise yaml.YAMLError("an alias (*name) is not allowed here")
+        return super().compose_node(parent, index)
+
+
+_YAML_1_1_ONLY = ("tag:yaml.org,2002:bool", "tag:yaml.org,2002:float", "tag:yaml.org,2002:timestamp")
+_StrictLoader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in _YAML_1_1_ONLY]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_StrictLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:bool", re.compile(r"^(true|True|TRUE|false|False|FALSE)$"), "tTfF"
+)
+_StrictLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$"),
+    "-+.0123456789",
+)
+
 C = TypeVar("C", bound=BaseModel)
 
 
@@ -32,7 +59,7 @@ def parse_config(model: type[C], value: object, *, path: Path | str | None = Non
         return model.model_validate_json(json.dumps(value, default=str))
     except ValidationError as error:
         raise _first_fault(model, error, path) from None
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         raise ConfigError(str(error), path=path) from None
 
 
@@ -45,7 +72,7 @@ def load_yaml(path: Path) -> Any:  # noqa: ANN401 - anything that YAML can hold
     try:
         if path.stat().st_size > _YAML_LIMIT_BYTES:
             raise ConfigError("is larger than 1 MiB, which no configuration needs", path=path)
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        return yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror or error}", path=path) from error
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:

@@ -44,3 +44,21 @@ def test_yaml_that_would_build_objects_is_refused(tmp_path):
     path.write_text("a: [1, 2")
     with pytest.raises(ConfigError, match=r"evil\.yaml: is not valid YAML"):
         load_yaml(path)
+
+
+def test_plain_values_are_those_of_yaml_1_2(tmp_path):
+    path = tmp_path / "m.yaml"
+    path.write_text("a: 1e-4\nb: off\nc: 2020-01-01\nd: 12\ne: true\nf: .5\ng: null\nh: 1.2.3")
+    assert list(load_yaml(path).values()) == [1e-4, "off", "2020-01-01", 12, True, 0.5, None, "1.2.3"]
+
+
+def test_aliases_that_could_fill_all_memory_are_refused(tmp_path):
+    path = tmp_path / "bomb.yaml"
+    path.write_text("a: &a [1, 2]\nb: [*a, *a]")
+    with pytest.raises(ConfigError, match=r"bomb\.yaml: is not valid YAML: an alias"):
+        load_yaml(path)
+
+
+def test_keys_that_are_no_words_are_refused():
+    with pytest.raises(ConfigError, match="keys must be"):
+        parse_config(Outer, {(1, 2): 3})

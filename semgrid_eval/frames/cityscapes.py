@@ -65,6 +65,9 @@ def find_sequences(
     images = [image for split in _splits(root, splits) for image in sorted((root / split).glob("*/*_leftImg8bit.png"))]
     runs = list(_runs(images))
     label_files = _LabelFiles(labels, images, train_ids=train_ids)
+    if labels is not None and not label_files.found_any:
+        wanted = f"{frame_name(images[0])}_" if images else "a frame's"
+        raise InputError(f"holds no .png whose name begins with {wanted}", path=labels, field="labels")
     sequences = [_sequence(run, label_files, train_ids=train_ids, camera_name=camera_name) for run in runs]
     if not sequences:
         raise InputError("holds no <split>/<city>/<city>_<sequence>_<number>_leftImg8bit.png", path=root)
@@ -153,6 +156,11 @@ class _LabelFiles:
                 named = [path.name[:end] for end in ends if path.name[:end] in frames]
                 if named:
                     self._found[named[-1]].append(path)
+
+    @property
+    def found_any(self) -> bool:
+        """Whether the folder holds a label image of any frame."""
+        return bool(self._found)
 
     def of(self, image: Path) -> tuple[Path, ...]:
         if self._folder is None:

@@ -5,7 +5,10 @@ import math
 from pathlib import Path
 from typing import Any
 
-from semgrid_eval.classes import label_ids_from_train_ids
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CITYSCAPES_LABELS, label_ids_from_train_ids
 from semgrid_eval.errors import InputError
 from semgrid_eval.frames.png import GRAY, PALETTE, PngHeader, decode_ids, encode_gray, read_header
 from semgrid_eval.frames.types import CameraCalibration, MotionSample
@@ -112,7 +115,15 @@ def read_label(path: Path, *, train_ids: bool) -> tuple[bytes, PngHeader]:
     if header.bit_depth == 8 and header.colour_type in (GRAY, PALETTE) and not train_ids:
         return data, header
     ids = decode_ids(data, path)
-    return encode_gray(label_ids_from_train_ids()[ids] if train_ids else ids), header
+    return encode_gray(_label_ids(ids, path) if train_ids else ids), header
+
+
+def _label_ids(train_ids: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
+    known = [label.train_id for label in CITYSCAPES_LABELS]  # 255, which stands for none, among them
+    strange = np.setdiff1d(train_ids, known)
+    if len(strange):
+        raise InputError(f"holds {strange[0]}, which is no train id; are these label ids?", path=path)
+    return label_ids_from_train_ids()[train_ids]
 
 
 def _read_object(path: Path) -> dict[str, Any]:

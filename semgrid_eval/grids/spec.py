@@ -4,6 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from semgrid_eval.classes import CLASS_NAMES, LABEL_ID
 from semgrid_eval.config import Config
 
 TARGET_SENSOR = "full"
@@ -21,8 +22,15 @@ class GridSpec(Config):
     rows: int = Field(128, ge=8, le=1024)
     columns: int = Field(128, ge=8, le=1024)
     cell_m: float = Field(100.0 / 128.0, gt=0.01, le=10.0)
-    agent_row: int = 128
-    agent_column: int = 64
+    agent_row: int = Field(128, ge=0)
+    agent_column: int = Field(64, ge=0)
+
+    @model_validator(mode="after")
+    def _agent_is_at_the_grid(self) -> Self:
+        if self.agent_row > self.rows or self.agent_column > self.columns:
+            place = f"{self.agent_row}, {self.agent_column}"
+            raise ValueError(f"the agent's cell {place} is outside {self.rows} x {self.columns}")
+        return self
 
 
 class Sensor(Config):
@@ -71,6 +79,11 @@ class GridConfig(Config):
         width, height = self.image_size_px
         if not (16 <= width <= 8192 and 16 <= height <= 8192):
             raise ValueError(f"image_size_px {width} x {height} is outside 16 to 8192")
+        for label, name in self.class_map.items():
+            if label not in LABEL_ID:
+                raise ValueError(f"class_map: {label!r} is not a Cityscapes label")
+            if name is not None and name not in CLASS_NAMES:
+                raise ValueError(f"class_map.{label}: {name!r} is not one of {', '.join(CLASS_NAMES)}")
         names = [sensor.name for sensor in self.all_sensors()]
         if len(set(names)) < len(names):
             raise ValueError("sensor names repeat")

@@ -168,7 +168,8 @@ def _coverage(log: LogReader, stamps_ns: dict[str, list[int]]) -> Iterator[Findi
 def _motion(samples: list[MotionSample]) -> Iterator[Finding]:
     ranges = (("speed_mps", SPEED_MPS, "m/s"), ("yaw_rate_radps", YAW_RATE_RADPS, "rad/s"))
     for field, (low, high), unit in ranges:
-        worst = max((getattr(sample, field) for sample in samples), key=abs, default=0.0)
+        values = [getattr(sample, field) for sample in samples]
+        worst = max(values, key=lambda value: max(low - value, value - high), default=0.0)
         if not low <= worst <= high:
             place = f"{topics.EGO_MOTION}: {field}"
             yield _error(place, f"{worst:g} {unit} is not within {low:g} to {high:g}")

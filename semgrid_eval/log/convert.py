@@ -91,7 +91,8 @@ def _convert(job: ConversionJob, out: Path) -> _Outcome:
             return _Outcome(written=False)
         write_log(job.load(), path)
     except SemgridError as error:
-        return _Outcome(written=False, failure=str(error))
+        stale = f" (the log of an earlier conversion stays: {path})" if path.exists() else ""
+        return _Outcome(written=False, failure=f"{error}{stale}")
     return _Outcome(written=True)
 
 

@@ -42,7 +42,7 @@ class CheckedPredictor:
         """
         try:
             scores = self._predictor(batch)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise InputError(f"raised {type(error).__name__}: {error}", field=self._name) from error
         fault = _fault(scores, batch)
         if fault:
@@ -62,13 +62,19 @@ def load_predictor(spec: str) -> Predictor:
     factory = _from_file(Path(path), name) if separator else _from_entry_point(spec)
     try:
         predictor = factory()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(f"raised {type(error).__name__}: {error}", field=spec) from error
     if not callable(predictor):
         raise InputError("gives an object that cannot be called", field=spec)
     if isinstance(predictor, torch.nn.Module):
         predictor.eval()
     return CheckedPredictor(predictor, spec)
+
+
+def installed_models() -> dict[str, str]:
+    """List the models that packages have registered: name -> package and version."""
+    found = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
+    return {entry.name: f"{entry.dist.name} {entry.dist.version}" if entry.dist else "" for entry in found}
 
 
 def one_hot(classes: Tensor) -> Tensor:
@@ -85,7 +91,7 @@ def _from_file(path: Path, name: str) -> Any:  # noqa: ANN401 - whatever the fil
     sys.modules[spec.name] = module  # dataclasses and pickle look a class's module up by name
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(f"raised {type(error).__name__}: {error}", path=path) from error
     if not hasattr(module, name):
         raise InputError(f"defines no {name!r}", path=path)
@@ -99,7 +105,7 @@ def _from_entry_point(name: str) -> Any:  # noqa: ANN401 - whatever the package 
         raise InputError(f"no model {name!r} is installed ({names} found); a file is given as path.py:Class")
     try:
         return known[name].load()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(f"raised {type(error).__name__}: {error}", field=name) from error
 
 

@@ -13,6 +13,7 @@ from semgrid_eval.errors import ConfigError
 from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
 from semgrid_eval.models.flow import FlowConfig
 from semgrid_eval.models.network import NetworkConfig
+from semgrid_eval.models.predictor import installed_models
 from semgrid_eval.models.training import TrainingConfig
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.sequences.windows import WindowConfig
@@ -26,6 +27,7 @@ BASELINES = {
     "flow": "all inputs overlaid, what is seen moving between the newest two moved on",
 }
 ROW_LIMIT = 10_000
+_ENDS = ("upper", "lower")
 
 
 class Row(Config):
@@ -34,7 +36,8 @@ class Row(Config):
     Args:
         name: unique in the matrix, like `ED-Sp2`; axes fill in `{key}` places.
         experiment: the group in which a report compares rows; the name without `BL-` or `ED-` if not given.
-        model: `ed`, a baseline (`newest`, `overlay`, `fuse`, `table`, `flow`), or `path.py:Class` of one's own.
+        model: `ed`, a baseline (`newest`, `overlay`, `fuse`, `table`, `flow`), `path.py:Class` of one's own, or the
+            name of an installed one.
         sensors: inputs, from the grid config's sensors.
         translate: whether inputs are moved to the target's time (T2); the paper's NT rows do not.
         mask_mode: what becomes of the mask M in scores (reading 9).
@@ -67,14 +70,13 @@ class Row(Config):
         for sensor in self.sensors:
             if sensor not in known:
                 raise ValueError(f"sensor {sensor!r} is not one of {', '.join(known)}")
-        if self.model not in (TRAINED_MODEL, *BASELINES) and ":" not in self.model:
-            raise ValueError(
-                f"model {self.model!r} is not one of {', '.join((TRAINED_MODEL, *BASELINES))} or path.py:Class"
-            )
+        models = (TRAINED_MODEL, *BASELINES, *installed_models())
+        if ":" not in self.model and self.model not in models:
+            raise ValueError(f"model {self.model!r} is not one of {', '.join(models)} or path.py:Class")
         if self.scored_window.inputs != self.window.inputs:
             raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
-        if self.model == "overlay" and len(self.sensors) != 2:
-            raise ValueError("overlay needs two sensors: the upper and the lower")
+        if self.model == "overlay" and any(sum(end in name for name in self.sensors) != 1 for end in _ENDS):
+            raise ValueError("overlay needs two sensors, one with 'upper' and one with 'lower' in its name")
         return self
 
     @property

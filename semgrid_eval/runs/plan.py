@@ -12,7 +12,6 @@ from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.runs.matrix import Matrix, Row
 from semgrid_eval.runs.runner import RunOptions, Unit, open_worker, plan_units
 from semgrid_eval.runs.unit import Training, Worker
-from semgrid_eval.scores.results import is_done, result_folder
 
 CALIBRATION_EPOCHS = 3
 CALIBRATION_UPDATES = 4
@@ -60,7 +59,7 @@ def plan_run(
     planned = []
     with stage("plan") as progress:
         for number, (key, unit) in enumerate(units.items(), start=1):
-            planned.append(_plan_unit(worker, unit, tuple(sharing[key]), out, speed))
+            planned.append(_plan_unit(worker, unit, tuple(sharing[key]), speed))
             progress(number, len(units), unit.row.name)
     return planned
 
@@ -70,14 +69,14 @@ def total_seconds(units: Sequence[PlannedUnit]) -> float:
     return sum(unit.seconds for unit in units)
 
 
-def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], out: Path, speed: "_Speed") -> PlannedUnit:
+def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], speed: "_Speed") -> PlannedUnit:
     try:
         job = worker.look(unit.row, unit.seed)
     except SemgridError as error:
         return PlannedUnit(rows, unit.seed, 0, 0, 0, 0.0, done=False, failure=str(error))
     config = unit.row.training
     updates = config.updates_until(config.epochs) if job.training else 0
-    done = is_done(result_folder(out, job.result_id))
+    done = worker.is_done(job)
     seconds = 0.0 if done or job.training is None else speed.seconds(unit.row, job.training)
     return PlannedUnit(rows, unit.seed, len(job.scored), updates, updates * config.batch, seconds, done)
 

@@ -54,6 +54,7 @@ class Outcome(NamedTuple):
 
     result_id: str | None
     failure: str | None
+    left_out: dict[str, str]  # logs that gave no window, and why
 
 
 def plan_units(matrix: Matrix) -> dict[str, Unit]:
@@ -87,7 +88,7 @@ def run_matrix(
     keys = list(units)
     with _unit_work(matrix, logs, out, options, worker, stage) as work:
         for index, outcome in options.executor.run(work, [units[key] for key in keys]):
-            outcomes[keys[index]] = Outcome(None, outcome.reason) if isinstance(outcome, WorkerDied) else outcome
+            outcomes[keys[index]] = Outcome(None, outcome.reason, {}) if isinstance(outcome, WorkerDied) else outcome
             record = keep_record()
     return record
 
@@ -164,9 +165,10 @@ def _worker_at(place: _Place) -> Worker:
 
 def _attempt(worker: Worker, unit: Unit) -> Outcome:
     try:
-        return Outcome(worker.run(unit.row, unit.seed), None)
+        result_id, left_out = worker.run(unit.row, unit.seed)
     except SemgridError as error:
-        return Outcome(None, str(error))
+        return Outcome(None, str(error), {})
+    return Outcome(result_id, None, left_out)
 
 
 def _units_of(row: Row, first_seed: int) -> Iterator[tuple[str, Unit]]:
@@ -188,9 +190,18 @@ def _record(
         started=started.utc,
         seconds=started.seconds(),
         logs=tuple(sources.records[key] for key in sorted(sources.records)),
-        failed_logs=sources.failed,
+        failed_logs=sources.failed | _too_short(outcomes),
         rows=tuple(_row_record(row, matrix.seed, outcomes) for row in matrix.rows),
     )
+
+
+def _too_short(outcomes: dict[str, Outcome]) -> dict[str, str]:
+    """Name the logs that gave some row no window."""
+    found: dict[str, str] = {}
+    for outcome in outcomes.values():
+        for log, reason in outcome.left_out.items():
+            found.setdefault(log, f"{log}: {reason}")
+    return found
 
 
 def _row_record(row: Row, first_seed: int, outcomes: dict[str, Outcome]) -> results.RowRecord:

@@ -4,19 +4,21 @@ import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
 
-from semgrid_eval.arrays import write_arrays
+from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.errors import ResultError
 from semgrid_eval.files import atomic_folder, digest_files, digest_value
 from semgrid_eval.models.baselines import FuseAll, OverlaySensors, RepeatNewest
 from semgrid_eval.models.checkpoint import HISTORY_FILE
 from semgrid_eval.models.device import choose_precision
 from semgrid_eval.models.flow import MoveOn
 from semgrid_eval.models.network import NetworkPredictor
-from semgrid_eval.models.predictor import Predictor, load_predictor
+from semgrid_eval.models.predictor import Predictor, installed_models, load_predictor
 from semgrid_eval.models.table import count_table
 from semgrid_eval.models.training import Trained, train
 from semgrid_eval.progress import Stage
@@ -56,23 +58,23 @@ class Worker:
         config = _config(row)
         learned_from = training.id if training else counted.digest() if counted is not None else None
         result_id = digest_value([results.FORMAT_VERSION, config, windows_id, learned_from])
-        return Job(result_id, config, scored, windows_id, training, counted)
+        return Job(result_id, config, scored, windows_id, training, counted, self._too_short(row))
 
-    def run(self, row: Row, seed: int | None) -> str:
-        """Make sure that the result of a row with one seed lies in the run's folder, and return its id.
+    def run(self, row: Row, seed: int | None) -> "Finished":
+        """Make sure that the result of a row with one seed lies in the run's folder.
 
         Raises:
             SemgridError: the row cannot be run; the message says why.
         """
         job = self.look(row, seed)
         folder = results.result_folder(self._out, job.result_id)
-        if results.is_done(folder):
-            return job.result_id
+        self._keep_windows(job.scored, job.windows_id)
+        if self.is_done(job):
+            return Finished(job.result_id, job.left_out)
         trained = self._train(job.training, row) if job.training else None
         predictor = _predictor(row, trained, job.counted)
         with self._stage(f"score {row.name}") as progress:
             evaluation = evaluate(predictor, job.scored, mask_mode=row.mask_mode, progress=progress)
-        self._keep_windows(job.scored, job.windows_id)
         record = results.ResultRecord(
             format_version=results.FORMAT_VERSION,
             id=job.result_id,
@@ -87,8 +89,17 @@ class Worker:
             parameters=trained.network.parameter_count if trained else None,
         )
         history = job.training.folder / HISTORY_FILE if job.training else None
-        _keep_result(folder, record, evaluation, history, with_predictions=seed in (None, self._example_seed))
-        return job.result_id
+        _keep_result(folder, record, evaluation, history, with_predictions=self._shows(seed))
+        return Finished(job.result_id, job.left_out)
+
+    def is_done(self, job: "Job") -> bool:
+        """Tell whether all that a job leaves lies in the run's folder."""
+        folder = results.result_folder(self._out, job.result_id)
+        seed = job.training.seed if job.training else None
+        return results.is_done(folder, with_predictions=self._shows(seed), with_history=job.training is not None)
+
+    def _shows(self, seed: int | None) -> bool:
+        return seed in (None, self._example_seed)
 
     def _window_set(
         self, row: Row, split: str, config: WindowConfig, plan: Callable[[list[int], WindowConfig], WindowPlan]
@@ -96,6 +107,11 @@ class Worker:
         data = self._sources.data(row.grid, split)
         windows = plan(data.frame_counts, config).windows
         return select_windows(data, windows, sensors=row.sensors, translate=row.translate)
+
+    def _too_short(self, row: Row) -> dict[str, str]:
+        data = self._sources.data(row.grid, row.validation_split)
+        reasons = validation_windows(data.frame_counts, row.scored_window).too_short
+        return {self._sources.log_of[data.recordings[index]]: reason for index, reason in reasons.items()}
 
     def _training(self, row: Row, seed: int) -> "Training":
         windows = self._window_set(row, row.train_split, row.window, training_windows)
@@ -106,6 +122,8 @@ class Worker:
                 "training": row.training.model_dump(),
                 "precision": str(choose_precision(row.training.precision, self.device)),
                 "device": self.device.type,
+                # Sums on a CPU are rounded by how many threads share them.
+                "threads": torch.get_num_threads() if self.device.type == "cpu" else None,
                 "seed": seed,
                 "windows": [windows.digest(), watched.digest(), grid_digest(row.grid)],
             }
@@ -127,8 +145,17 @@ class Worker:
 
     def _keep_windows(self, windows: WindowSet, windows_id: str) -> None:
         path = results.windows_file(self._out, windows_id)
-        if not path.is_file():
+        try:
+            read_arrays(path, ("inputs", "target", "mask"))
+        except ResultError:  # not there yet, or damaged
             write_arrays(path, window_arrays(windows))
+
+
+class Finished(NamedTuple):
+    """A result that lies in the run's folder, and the logs that gave it no window, with the reason."""
+
+    result_id: str
+    left_out: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -141,6 +168,7 @@ class Job:
         scored: validation windows; `windows_id` names their file.
         training: what has to be trained, if anything.
         counted: training windows of BL-Table.
+        left_out: logs whose recordings are too short for the row's windows, and by how much.
     """
 
     result_id: str
@@ -149,6 +177,7 @@ class Job:
     windows_id: str
     training: "Training | None"
     counted: WindowSet | None
+    left_out: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -171,9 +200,11 @@ def identity(row: Row) -> dict[str, object]:
 
 def _config(row: Row) -> dict[str, object]:
     """Return a row's identity and, for a model of one's own, the digest of its code."""
-    if ":" not in row.model:
-        return identity(row)
-    return {**identity(row), "code": digest_files([Path(row.model.rpartition(":")[0])])}
+    if ":" in row.model:
+        return {**identity(row), "code": digest_files([Path(row.model.rpartition(":")[0])])}
+    if row.model in installed_models():
+        return {**identity(row), "code": installed_models()[row.model]}
+    return identity(row)
 
 
 def _predictor(row: Row, trained: Trained | None, counted: WindowSet | None) -> Predictor:

@@ -1,7 +1,7 @@
 """Predict once: run a predictor over all windows and keep counts, classes and certainty."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -14,7 +14,7 @@ from semgrid_eval.grids.spec import MOVING, STANDING
 from semgrid_eval.models.predictor import Predictor
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores.iou import Counts, confusion
-from semgrid_eval.sequences.dataset import WindowSet
+from semgrid_eval.sequences.dataset import WindowBatch, WindowSet
 
 MaskMode = Literal["exclude", "substitute", "off"]
 
@@ -61,7 +61,7 @@ def evaluate(
         part = windows.batch(chosen)
         start_s = time.perf_counter()
         with torch.inference_mode():
-            certainty, prediction = predictor(part).max(dim=1)
+            certainty, prediction = predictor(_without_answer(part)).max(dim=1)
             answer = prediction.to(torch.uint8).cpu().numpy()
         seconds += time.perf_counter() - start_s
         predictions.append(answer)
@@ -79,6 +79,11 @@ def evaluate(
         np.concatenate(certainties),
         seconds,
     )
+
+
+def _without_answer(batch: WindowBatch) -> WindowBatch:
+    """Hide the target and the mask: a predictor sees past and motion only, and can change neither."""
+    return replace(batch, target=torch.zeros_like(batch.target), mask=torch.zeros_like(batch.mask))
 
 
 def apply_mask(

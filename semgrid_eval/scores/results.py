@@ -26,10 +26,12 @@ from semgrid_eval.arrays import read_arrays as read_arrays
 from semgrid_eval.arrays import write_arrays as write_arrays
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config, parse_config
-from semgrid_eval.errors import ConfigError, ResultError
+from semgrid_eval.errors import ConfigError, InputError, ResultError
 from semgrid_eval.files import read_json, write_json
 
 FORMAT_VERSION = 1
+PREDICTIONS_FILE = "predictions.npz"
+HISTORY_FILE = "history.csv"
 REGIONS = ("moving", "standing")
 """Where counts are kept apart: near actors that move, and near those that stand."""
 
@@ -154,12 +156,17 @@ def write_result(folder: Path, record: ResultRecord) -> None:
     write_json(folder / "result.json", record.model_dump(mode="json"))
 
 
-def is_done(folder: Path) -> bool:
-    """Tell whether a result parses, matches its id and has counts of the right shape."""
+def is_done(folder: Path, *, with_predictions: bool = False, with_history: bool = False) -> bool:
+    """Tell whether a result parses, matches its id, has counts of the right shape, and what else is asked for."""
     try:
         read_region_counts(folder)
-        return len(read_counts(folder)) == len(read_result(folder).windows)
-    except (ResultError, ConfigError, OSError, ValueError):
+        count = len(read_result(folder).windows)
+        if with_predictions:
+            read_arrays(folder / PREDICTIONS_FILE, ("prediction", "certainty"))
+        if with_history and (history := read_history(folder)) is not None and history.empty:
+            return False
+        return len(read_counts(folder)) == count and (not with_history or (folder / HISTORY_FILE).is_file())
+    except (ResultError, ConfigError, InputError, OSError, ValueError):
         return False
 
 
@@ -197,7 +204,7 @@ def read_region_counts(folder: Path) -> dict[str, NDArray[np.int64]]:
 
 def read_history(folder: Path) -> pd.DataFrame | None:
     """Read the training history of a result, None where nothing was trained."""
-    path = folder / "history.csv"
+    path = folder / HISTORY_FILE
     return pd.read_csv(path) if path.is_file() else None
 
 

@@ -199,10 +199,24 @@ def test_label_ids_are_chosen_among_several_pictures_of_a_frame(tree, tmp_path):
 
 def test_train_ids_become_label_ids(tree, tmp_path):
     (name,) = tree.write([0])
-    train_ids = np.arange(64 * 32, dtype=np.uint8).reshape(32, 64)
+    train_ids = np.resize(np.array([*range(19), 255], np.uint8), (32, 64))
     put(tmp_path / "labels" / f"{name}.png", with_palette(encode_gray(train_ids), label_palette()))
     (frame,) = frames(only(tree, labels=tmp_path / "labels", train_ids=True))
     assert np.array_equal(decode_ids(frame.label_png), label_ids_from_train_ids()[train_ids])
+
+
+def test_label_ids_taken_for_train_ids_are_noticed(tree, tmp_path):
+    (name,) = tree.write([0])
+    put(tmp_path / "labels" / f"{name}.png", encode_gray(np.full((32, 64), 26, np.uint8)))
+    with pytest.raises(InputError, match=rf"{name}\.png: holds 26, which is no train id; are these label ids\?"):
+        frames(only(tree, labels=tmp_path / "labels", train_ids=True))
+
+
+def test_labels_of_other_frames_alone_are_noticed(tree, tmp_path):
+    tree.write([0])
+    put(tmp_path / "labels" / "berlin_000000_000000.png", tree.label())
+    with pytest.raises(InputError, match=r"labels: holds no \.png whose name begins with aachen_000000_000000_"):
+        only(tree, labels=tmp_path / "labels")
 
 
 def test_train_ids_of_gt_fine_are_those_of_its_own_file(tree):

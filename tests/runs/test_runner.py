@@ -256,3 +256,45 @@ def test_recordings_of_another_frame_rate_are_scored_in_windows_of_their_own(log
     assert record.rows[0].step_frames == 2
     result = results.read_result(results.result_folder(tmp_path / "run", record.rows[0].results[0]))
     assert [window.target_frame for window in result.windows] == [4, 5, 6, 7, 8] * 2
+
+
+def test_a_model_that_cheats_or_leaves_is_stopped(logs, tmp_path):
+    (tmp_path / "bad.py").write_text(
+        "import torch\n"
+        "class Peeks:\n"
+        "    def __call__(self, batch):\n"
+        "        batch.mask.fill_(True)\n"
+        "        return torch.nn.functional.one_hot(batch.target.long(), 10).permute(0, 3, 1, 2).float()\n"
+        "class Leaves:\n"
+        "    def __call__(self, batch):\n"
+        "        raise SystemExit(3)\n"
+    )
+    rows = [{"name": name, "model": f"{tmp_path}/bad.py:{name}"} for name in ("Peeks", "Leaves")]
+    record = run(rows, logs, tmp_path / "run")
+    counts = results.read_counts(results.result_folder(tmp_path / "run", record.rows[0].results[0]))
+    assert counts[:, :, 1:].sum() == 0  # the target that it saw was empty, and so is its answer
+    assert counts.sum() > 10_000  # and its mask was not ours
+    assert "raised SystemExit: 3" in str(record.rows[1].failure)
+
+
+def test_whatever_a_result_has_lost_is_made_again(logs, tmp_path):
+    out = tmp_path / "run"
+    rows = [{"name": "ED-DC", "model": "ed"}]
+    record = run(rows, logs, out)
+    folder = results.result_folder(out, record.rows[0].results[0])
+    windows = next((out / "windows").iterdir())
+    kept = {path: path.read_bytes() for path in (windows, folder / "predictions.npz", folder / "history.csv")}
+    windows.write_bytes(b"junk")
+    (folder / "predictions.npz").unlink()
+    (folder / "history.csv").write_text("")
+    run(rows, logs, out)
+    assert kept == {path: path.read_bytes() for path in kept}
+
+
+def test_logs_too_short_for_a_window_are_named(logs, tmp_path):
+    folder = tmp_path / "logs"
+    write_log(street(1, frames=9).recording("long"), folder / "long.mcap")
+    write_log(street(1, frames=5).recording("short"), folder / "short.mcap")
+    record = run([{"name": "BL-DC", "model": "newest"}], folder, tmp_path / "run")
+    assert record.rows[0].failure is None
+    assert record.failed_logs == {"short.mcap": "short.mcap: has 5 frames, and a window needs 9"}
