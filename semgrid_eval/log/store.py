@@ -23,15 +23,26 @@ T = TypeVar("T")
 
 
 def find_logs(folder: Path) -> list[Path]:
-    """List all logs below a folder, sorted by path; hidden files are left out.
+    """List all logs below a folder, linked folders included, sorted by path; hidden files are left out.
 
     Raises:
         InputError: the folder does not exist or holds no log.
     """
-    found = sorted(path for path in folder.rglob(f"*{SUFFIX}") if not path.name.startswith("."))
+    found = sorted(_walk(folder, {folder.resolve()}))
     if not found:
         raise InputError("holds no .mcap log" if folder.is_dir() else "is no folder", path=folder)
     return found
+
+
+def _walk(folder: Path, seen: set[Path]) -> Iterator[Path]:
+    """Find logs in a folder and those below it, each folder once, however links lead to it."""
+    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
+        if path.is_dir():
+            if path.resolve() not in seen:
+                seen.add(path.resolve())
+                yield from _walk(path, seen)
+        elif path.suffix == SUFFIX and not path.name.startswith("."):
+            yield path
 
 
 def write_log(recording: Recording, path: Path) -> None:

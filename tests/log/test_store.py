@@ -227,3 +227,16 @@ def test_a_frame_is_given_before_the_next_is_read(log):
         assert next(frames) == next(log.frames("front"))
         with pytest.raises(LogError, match=r"broken\.mcap: is damaged"):
             list(frames)
+
+
+def test_logs_in_linked_folders_are_found_once_and_links_in_a_circle_end(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "logs" / "a").mkdir(parents=True)
+    for path in ("elsewhere/x.mcap", "logs/a/y.mcap", "logs/a/.z.mcap.1.part", "logs/.hidden.mcap"):
+        (tmp_path / path).touch()
+    (tmp_path / "logs" / "linked").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "logs" / "a" / "up").symlink_to(tmp_path / "logs")
+    assert [str(path.relative_to(tmp_path)) for path in find_logs(tmp_path / "logs")] == [
+        "logs/a/y.mcap",
+        "logs/linked/x.mcap",
+    ]
