@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from google.protobuf.message import Message
 
-from semgrid_eval.errors import LogError
+from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.frames.png import read_header
 from semgrid_eval.frames.types import Pose
 from semgrid_eval.log import codec, topics
@@ -98,13 +98,19 @@ class Drive:
             (camera, channel), now_ns = shown[topic], stamp_ns + shift_ns
             with damage_as_log_error(self._log.path):
                 png = read_picture(data)
-                header = read_header(png)
             if calibrated.get(camera) != now_ns:
                 calibrated[camera] = now_ns
-                size = (header.width, header.height)
-                known, _ = codec.calibration_messages(now_ns, camera, self._calibrations[camera], size)
+                size_px = self._size_px(png, topic)
+                known, _ = codec.calibration_messages(now_ns, camera, self._calibrations[camera], size_px)
                 yield Outgoing(now_ns, camera_topic(camera, topics.CALIBRATION), known)
             yield Outgoing(now_ns, topic, codec.image_message(now_ns, camera, png), notes=notes[channel])
+
+    def _size_px(self, png: bytes, topic: str) -> tuple[int, int]:
+        try:
+            header = read_header(png)
+        except InputError as error:
+            raise LogError(str(error), path=self._log.path, field=topic) from error
+        return header.width, header.height
 
 
 def _poses(log: LogReader, topic: str) -> Iterator[Pose]:

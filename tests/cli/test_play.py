@@ -1,0 +1,62 @@
+import shlex
+from pathlib import Path
+
+import pytest
+import yaml
+from click.testing import CliRunner
+from mcap.reader import make_reader
+from support.toy_world import street
+
+from semgrid_eval.cli.main import cli, main
+from semgrid_eval.log.store import write_log
+
+
+@pytest.fixture(scope="module")
+def workplace(tmp_path_factory):
+    """A folder with logs and a run."""
+    folder = tmp_path_factory.mktemp("play")
+    write_log(street(0, frames=9).recording("toy"), folder / "logs" / "val" / "toy.mcap")
+    rows = [{"name": "BL-DC", "model": "newest", "window": {"step_frames": 3, "target_frame": 8}}]
+    (folder / "m.yaml").write_text(yaml.safe_dump({"rows": rows}))
+    call("run", str(folder / "m.yaml"), "--logs", str(folder / "logs"), "--out", str(folder / "runs" / "first"))
+    return folder
+
+
+@pytest.fixture
+def here(tmp_path, workplace, monkeypatch):
+    for name in ("logs", "runs"):
+        (tmp_path / name).symlink_to(workplace / name)
+    monkeypatch.chdir(tmp_path)
+
+
+def call(*arguments):
+    result = CliRunner().invoke(cli, list(arguments), standalone_mode=False)
+    if result.exception:
+        raise result.exception
+    return result
+
+
+def test_example_of_play_writes_a_log_and_a_layout(here):
+    result = call(*shlex.split(call("play", "--help").stdout.partition("Example: semgrid-eval ")[2]))
+    assert result.stdout == "play.mcap\n"
+    assert "play.layout.json" in result.stderr
+    assert Path("play.layout.json").is_file()
+    with Path("play.mcap").open("rb") as stream:
+        topics = {channel.topic for channel in make_reader(stream).get_summary().channels.values()}
+    assert {"/grid/target", "/grid/prediction/BL-DC", "/camera/front/image", "/tf"} <= topics
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["runs/first", "BL-NT"], 1, "Error: runs/first: there is no row 'BL-NT', only BL-DC"),
+        (["nowhere", "BL-DC"], 1, "Error: nowhere: no run lies here"),
+        (["runs/first", "BL-DC", "--all", "--recording", "toy"], 2, "--recording names one recording"),
+    ],
+)
+def test_a_users_mistake_is_told_without_a_traceback(here, capsys, arguments, code, message):
+    with pytest.raises(SystemExit) as stop:
+        main(["play", *arguments, "--out", "play.mcap"])
+    assert stop.value.code == code
+    assert message in capsys.readouterr().err.splitlines()[-1]
+    assert not Path("play.mcap").exists()
