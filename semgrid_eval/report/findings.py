@@ -96,7 +96,7 @@ def sentence(findings: Sequence[Finding]) -> str:
     words = (
         (Verdict.HOLDS, "holds", "hold"),
         (Verdict.FAILS, "does not", "do not"),
-        (Verdict.OPEN, "is open", "are open"),
+        (Verdict.OPEN, "is undecided", "are undecided"),
     )
     parts = ", ".join(f"{count[kind]} {one if count[kind] == 1 else many}" for kind, one, many in words)
     return f"Of {plural(len(findings), 'claim')}, {tested} can be tested here: {parts}."
@@ -116,7 +116,9 @@ def missing_table(name: str, findings: Sequence[Finding]) -> Table:
         for each in findings
         if each.verdict is Verdict.NOT_RUN
     )
-    return Table(name, "Claims that were not run, for want of rows.", "Claim", (("Needs", ""),), bodies)
+    return Table(
+        name, "Claims that were not run, and the rows or logs that they need.", "Claim", (("Needs", ""),), bodies
+    )
 
 
 def finding_frame(findings: Sequence[Finding]) -> pd.DataFrame:

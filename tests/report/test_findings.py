@@ -21,6 +21,7 @@ from semgrid_eval.report.findings import (
 )
 from semgrid_eval.report.reading import Run, load_runs
 from semgrid_eval.report.regions import score_regions
+from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.scores.results import REGIONS
 
 RECORDINGS = 12
@@ -170,7 +171,13 @@ def test_every_claim_has_its_own_name_and_says_its_margin():
             assert str(MARGIN) in claim.text
 
 
-def test_tables_and_records_tell_the_same(tmp_path):
+def test_presets_name_every_row_that_a_claim_needs():
+    rows = [row.name for name in ("paper-cpu", "architecture") for row in load_matrix(name).rows]
+    needed = {name for claim in claims(rows) for check in claim.checks for name in check.weights}
+    assert needed <= set(rows)
+
+
+def test_tables_and_records_tell_the_same():
     found = list(_findings(_row("BL-DC", 50), _row("ED-DC", 60, car=45)).values())
     tested, missing = finding_table("findings", found), missing_table("not-run", found)
     assert [body[0].header for body in tested.bodies] == [
@@ -181,7 +188,7 @@ def test_tables_and_records_tell_the_same(tmp_path):
     frame, records = finding_frame(found), finding_records(found)
     assert frame.verdict.tolist() == [each["verdict"] for each in records for _ in each["checks"]]
     assert frame[frame.name == "large-BL-DC"].comparison_verdict.tolist() == ["holds", "does not hold"]
-    assert sentence(found) == "Of 25 claims, 2 can be tested here: 1 holds, 1 does not, 0 are open."
+    assert sentence(found) == "Of 25 claims, 2 can be tested here: 1 holds, 1 does not, 0 are undecided."
 
 
 def test_rows_are_found_by_name_then_by_model_and_experiment():
