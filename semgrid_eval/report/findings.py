@@ -106,7 +106,8 @@ def finding_table(name: str, findings: Sequence[Finding]) -> Table:
     """Show the claims that were tested, each above the comparisons behind it."""
     bodies = tuple(_body(each) for each in findings if each.verdict is not Verdict.NOT_RUN)
     columns = (("Verdict", ""), ("Score", ""), ("Difference", "95% interval"))
-    return Table(name, "The paper's claims, and the same against stronger baselines.", "Claim", columns, bodies)
+    caption = f"The paper's claims, and the same against stronger baselines{_tag(findings)}."
+    return Table(name, caption, "Claim", columns, bodies)
 
 
 def missing_table(name: str, findings: Sequence[Finding]) -> Table:
@@ -116,9 +117,8 @@ def missing_table(name: str, findings: Sequence[Finding]) -> Table:
         for each in findings
         if each.verdict is Verdict.NOT_RUN
     )
-    return Table(
-        name, "Claims that were not run, and the rows or logs that they need.", "Claim", (("Needs", ""),), bodies
-    )
+    caption = f"Claims that were not run, and the rows or logs that they need{_tag(findings)}."
+    return Table(name, caption, "Claim", (("Needs", ""),), bodies)
 
 
 def finding_frame(findings: Sequence[Finding]) -> pd.DataFrame:
@@ -149,6 +149,10 @@ def finding_records(findings: Sequence[Finding]) -> list[dict[str, Any]]:
         }
         for each in findings
     ]
+
+
+def _tag(findings: Sequence[Finding]) -> str:
+    return next((f" ({each.run})" for each in findings if each.run), "")
 
 
 def _by_record(scores: Scores, run: Path) -> dict[str, RowScores]:

@@ -208,4 +208,10 @@ def test_each_run_has_its_own_findings(tmp_path):
     found = find(runs, score_rows(every, np.random.default_rng(0), draws=20), score_regions(every, 0))
     assert {each.run for each in found if each.verdict is not NOT_RUN} == {"one"}
     assert {each.run for each in found} == {"one", "two"}
+    captions = {
+        table(tag, [f for f in found if f.run == tag]).caption
+        for table in (finding_table, missing_table)
+        for tag in ("one", "two")
+    }
+    assert len(captions) == 4
     assert set(REGIONS) == set(score_regions(every, 0))
