@@ -76,7 +76,9 @@ class Sources:
             with self._stage("grids") as progress:
                 data_set = build_grids(self._logs, self._cache, config, executor=self._executor, progress=progress)
             self._sets[key] = data_set
-            self.failed.update(data_set.failed)
+            for log, reason in data_set.failed.items():
+                path = str(Path(log).relative_to(self._folder))
+                self.failed[path] = reason.replace(log, path)
             for recording in data_set.recordings:
                 path = str(Path(recording.log).relative_to(self._folder))
                 other = self.log_of.setdefault(recording.name, path)

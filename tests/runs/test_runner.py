@@ -298,3 +298,14 @@ def test_logs_too_short_for_a_window_are_named(logs, tmp_path):
     record = run([{"name": "BL-DC", "model": "newest"}], folder, tmp_path / "run")
     assert record.rows[0].failure is None
     assert record.failed_logs == {"short.mcap": "short.mcap: has 5 frames, and a window needs 9"}
+
+
+def test_a_damaged_log_is_named_by_its_place_and_the_others_are_scored(logs, tmp_path):
+    folder = tmp_path / "logs"
+    write_log(street(1, frames=9).recording("good"), folder / "val" / "good.mcap")
+    (folder / "val" / "bad.mcap").write_bytes((folder / "val" / "good.mcap").read_bytes()[:5000])
+    record = run([{"name": "BL-DC", "model": "newest"}], folder, tmp_path / "run")
+    assert record.rows[0].failure is None
+    assert list(record.failed_logs) == ["val/bad.mcap"]
+    assert record.failed_logs["val/bad.mcap"].startswith("val/bad.mcap: ")
+    assert str(tmp_path) not in str(record.failed_logs)
