@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
 @click.option("--logs", required=True, type=click.Path(path_type=Path, exists=True), help="Folder of MCAP logs.")
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the run.")
 @click.option("--grids", type=click.Path(path_type=Path, file_okay=False), help="Grid cache (default: OUT/grids).")
+@click.option("--row", "only", multiple=True, help="Only this row; may be given several times.")
 @click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Rows trained at once.")
 @click.option(
@@ -38,6 +39,7 @@ def command(
     logs: Path,
     out: Path,
     grids: Path | None,
+    only: tuple[str, ...],
     device: str,
     jobs: int,
     workers: int,
@@ -61,17 +63,18 @@ def command(
 
     resolved = load_matrix(matrix)
     rows_on: Executor = local_executor(jobs) if executor == "local" else _ray(address, jobs, gpus)
-    options = RunOptions(device, grids or out / "grids", command_line(), rows_on, local_executor(workers))
+    options = RunOptions(device, grids or out / "grids", command_line(), only, rows_on, local_executor(workers))
     if dry_run:
         return _show_plan(resolved, logs, out, options)
     record = run_matrix(resolved, logs, out, options, stage=progress)
     for row in record.rows:
-        if row.failure:
+        if row.failure and (not only or row.name in only):
             say(f"Error: row {row.name}: {row.failure}")
     for reason in record.failed_logs.values():
         say(f"Error: {reason}")
     click.echo(out)
-    return 1 if record.failed_logs or any(row.failure for row in record.rows) else 0
+    failed = any(row.failure for row in record.rows if not only or row.name in only)
+    return 1 if record.failed_logs or failed else 0
 
 
 def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -> int:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import torch
 
-from semgrid_eval.errors import SemgridError
+from semgrid_eval.errors import ConfigError, SemgridError
 from semgrid_eval.executors import Executor, InProcess, WorkerDied
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.device import choose_device, keep_freed_memory
@@ -31,6 +31,7 @@ class RunOptions:
         device: `auto`, `cpu`, `cuda`, `cuda:1`, ...
         grids: folder in which grids are kept.
         command: how the run was started, for the record.
+        only: names of the rows to work on, all where it is empty; what the others have already is kept in the record.
         executor: where rows are trained and scored.
         grid_executor: where grids are built.
     """
@@ -38,6 +39,7 @@ class RunOptions:
     device: str
     grids: Path
     command: str
+    only: tuple[str, ...] = ()
     executor: Executor = field(default_factory=InProcess)
     grid_executor: Executor = field(default_factory=InProcess)
 
@@ -73,11 +75,13 @@ def run_matrix(
 
     Raises:
         InputError: there is no log at all, or the device does not exist.
+        ConfigError: `options.only` names a row that the matrix does not have.
     """
     started = _Clock()
     worker, sources = _open(matrix, logs, out, options, stage)
     units = plan_units(matrix)
-    outcomes: dict[str, Outcome] = {}
+    wanted = wanted_keys(matrix, options.only)
+    outcomes = {key: found for key in units if key not in wanted and (found := _finished(worker, units[key]))}
 
     def keep_record() -> results.RunRecord:
         record = _record(matrix, options.command, started, worker.device, sources, outcomes)
@@ -85,7 +89,7 @@ def run_matrix(
         return record
 
     record = keep_record()
-    keys = list(units)
+    keys = [key for key in units if key in wanted]
     with _unit_work(matrix, logs, out, options, worker, stage) as work:
         for index, outcome in options.executor.run(work, [units[key] for key in keys]):
             outcomes[keys[index]] = Outcome(None, outcome.reason, {}) if isinstance(outcome, WorkerDied) else outcome
@@ -161,6 +165,25 @@ def _worker_at(place: _Place) -> Worker:
     device = choose_device(place.device)
     sources = Sources(place.logs, place.grids, matrix.rows, executor=InProcess(), device=device, stage=silent_stage)
     return Worker(place.out, sources, device, matrix.seed, silent_stage)
+
+
+def wanted_keys(matrix: Matrix, only: tuple[str, ...]) -> set[str]:
+    """Give the keys of the units of the rows that are asked for."""
+    names = {row.name for row in matrix.rows}
+    for name in only:
+        if name not in names:
+            raise ConfigError(f"{name!r} is not a row of this matrix: {', '.join(sorted(names))}", field="row")
+    chosen = [row for row in matrix.rows if not only or row.name in only]
+    return {key for row in chosen for key, _ in _units_of(row, matrix.seed)}
+
+
+def _finished(worker: Worker, unit: Unit) -> Outcome | None:
+    """Find what an earlier run left of a unit."""
+    try:
+        job = worker.look(unit.row, unit.seed)
+    except SemgridError:
+        return None
+    return Outcome(job.result_id, None, job.left_out) if worker.is_done(job) else None
 
 
 def _attempt(worker: Worker, unit: Unit) -> Outcome:

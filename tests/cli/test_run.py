@@ -66,6 +66,8 @@ def test_dry_run_tells_updates_and_minutes_and_trains_nothing(here):
     assert table[2][1:5] == ["0", "1", "6", "12"]
     assert not (here / "run" / "trainings").exists()
     assert not (here / "run" / "results").exists()
+    alone = call(*arguments, "--dry-run", "--row", "ED-SL2").stdout.splitlines()
+    assert [line.split("\t")[0] for line in alone] == ["rows", "ED-DC,ED-SL2"]
     call(*arguments)
     assert call(*arguments, "--dry-run").stdout.count("\tdone") == 2
 

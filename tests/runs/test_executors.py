@@ -73,7 +73,7 @@ def test_ray_gives_the_same_bytes_as_this_process(tmp_path):
     counts = {}
     executor = RayExecutor(local_cpus=2)
     for name, rows_on in (("here", InProcess()), ("ray", executor)):
-        options = RunOptions("cpu", tmp_path / "grids", "test", rows_on)
+        options = RunOptions("cpu", tmp_path / "grids", "test", executor=rows_on)
         record = run_matrix(matrix, tmp_path / "logs", tmp_path / name, options)
         assert [row.failure for row in record.rows] == [None, None]
         counts[name] = [results.read_counts(results.result_folder(tmp_path / name, r.results[0])) for r in record.rows]

@@ -9,7 +9,7 @@ import yaml
 from support.toy_world import street
 
 from semgrid_eval.classes import CLASS_NAMES, LABEL_ID
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.executors import InProcess, Processes
 from semgrid_eval.frames.types import Actor, Pose
 from semgrid_eval.log.store import write_log
@@ -32,10 +32,10 @@ def logs(tmp_path_factory):
     return folder
 
 
-def run(rows, logs, out, executor=None, **defaults):
+def run(rows, logs, out, executor=None, only=(), **defaults):
     path = out.parent / f"{out.name}.yaml"
     path.write_text(yaml.safe_dump({"seed": 5, "defaults": {"window": WINDOW, **TINY, **defaults}, "rows": rows}))
-    options = RunOptions("cpu", out.parent / "grids", "test", executor or InProcess())
+    options = RunOptions("cpu", out.parent / "grids", "test", only, executor or InProcess())
     return run_matrix(load_matrix(str(path)), logs, out, options)
 
 
@@ -309,3 +309,15 @@ def test_a_damaged_log_is_named_by_its_place_and_the_others_are_scored(logs, tmp
     assert list(record.failed_logs) == ["val/bad.mcap"]
     assert record.failed_logs["val/bad.mcap"].startswith("val/bad.mcap: ")
     assert str(tmp_path) not in str(record.failed_logs)
+
+
+def test_one_row_alone_can_be_run_and_the_others_keep_what_they_have(logs, tmp_path):
+    out = tmp_path / "run"
+    rows = [{"name": name, "model": model} for name, model in (("BL-DC", "newest"), ("BL-Fuse", "fuse"), ("ED", "ed"))]
+    first = run(rows, logs, out, only=("BL-DC",))
+    assert [row.failure for row in first.rows] == [None, "not run yet", "not run yet"]
+    second = run(rows, logs, out, only=("BL-Fuse",))
+    assert [row.failure for row in second.rows] == [None, None, "not run yet"]
+    assert second.rows[0].results == first.rows[0].results
+    with pytest.raises(ConfigError, match=r"row: 'BL-Fus' is not a row of this matrix: BL-DC, BL-Fuse, ED"):
+        run(rows, logs, out, only=("BL-Fus",))
