@@ -10,7 +10,7 @@ from semgrid_eval.files import digest_value
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.runs.matrix import Matrix, Row
-from semgrid_eval.runs.runner import RunOptions, Unit, open_worker, plan_units, wanted_keys
+from semgrid_eval.runs.runner import RunOptions, Unit, make_worker, plan_units, units_of, wanted_keys
 from semgrid_eval.runs.unit import Training, Worker
 
 CALIBRATION_EPOCHS = 3
@@ -49,12 +49,13 @@ def plan_run(
     Raises:
         InputError: there is no log at all, or the device does not exist.
     """
-    worker = open_worker(matrix, logs, out, options, stage)
+    worker = make_worker(matrix, logs, out, options, stage)
+    worker.sources.prepare()
     wanted = wanted_keys(matrix, options.only)
     units = {key: unit for key, unit in plan_units(matrix).items() if key in wanted}
     sharing: dict[str, list[str]] = {key: [] for key in units}
     for row in matrix.rows:
-        for key in plan_units(matrix.model_copy(update={"rows": (row,)})):
+        for key, _ in units_of(row, matrix.seed):
             if key in sharing:
                 sharing[key].append(row.name)
     speed = _Speed(worker)

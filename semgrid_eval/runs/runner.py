@@ -9,13 +9,11 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
-import torch
-
 from semgrid_eval.errors import ConfigError, SemgridError
 from semgrid_eval.executors import Executor, InProcess, WorkerDied
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.device import choose_device, keep_freed_memory
-from semgrid_eval.progress import Stage, silent_stage
+from semgrid_eval.progress import Progress, Stage, silent, silent_stage
 from semgrid_eval.runs.matrix import Matrix, Row
 from semgrid_eval.runs.provenance import machine, versions
 from semgrid_eval.runs.sources import Sources
@@ -63,7 +61,7 @@ def plan_units(matrix: Matrix) -> dict[str, Unit]:
     """List the distinct units of a matrix by key; rows that mean the same share them."""
     units: dict[str, Unit] = {}
     for row in matrix.rows:
-        for key, unit in _units_of(row, matrix.seed):
+        for key, unit in units_of(row, matrix.seed):
             units.setdefault(key, unit)
     return units
 
@@ -78,40 +76,38 @@ def run_matrix(
         ConfigError: `options.only` names a row that the matrix does not have.
     """
     started = _Clock()
-    worker, sources = _open(matrix, logs, out, options, stage)
+    worker = make_worker(matrix, logs, out, options, stage)
+    worker.sources.prepare()
     units = plan_units(matrix)
     wanted = wanted_keys(matrix, options.only)
     outcomes = {key: found for key in units if key not in wanted and (found := _finished(worker, units[key]))}
 
     def keep_record() -> results.RunRecord:
-        record = _record(matrix, options.command, started, worker.device, sources, outcomes)
+        record = _record(matrix, options.command, started, worker, outcomes)
         results.write_run(out, record)  # a run that is stopped can be reported as far as it came
         return record
 
     record = keep_record()
     keys = [key for key in units if key in wanted]
-    with _unit_work(matrix, logs, out, options, worker, stage) as work:
-        for index, outcome in options.executor.run(work, [units[key] for key in keys]):
+    with _unit_work(matrix, logs, out, options, worker, stage) as (work, progress):
+        progress(0, len(keys))
+        for done, (index, outcome) in enumerate(options.executor.run(work, [units[key] for key in keys]), start=1):
             outcomes[keys[index]] = Outcome(None, outcome.reason, {}) if isinstance(outcome, WorkerDied) else outcome
             record = keep_record()
+            progress(done, len(keys))
     return record
 
 
-def open_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:
-    """Build what grids are missing and give the worker of this process.
+def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:
+    """Make a worker for the units of a matrix; it builds or reads grids when they are asked for.
 
     Raises:
         InputError: there is no log at all, or the device does not exist.
     """
-    return _open(matrix, logs, out, options, stage)[0]
-
-
-def _open(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> tuple[Worker, Sources]:
     keep_freed_memory()
     device = choose_device(options.device)
     sources = Sources(logs, options.grids, matrix.rows, executor=options.grid_executor, device=device, stage=stage)
-    sources.prepare()
-    return Worker(out, sources, device, matrix.seed, stage), sources
+    return Worker(out, sources, device, matrix.seed, stage)
 
 
 class _Clock:
@@ -129,18 +125,15 @@ class _Clock:
 @contextmanager
 def _unit_work(
     matrix: Matrix, logs: Path, out: Path, options: RunOptions, worker: Worker, stage: Stage
-) -> Iterator[Callable[[Unit], Outcome]]:
-    """Give the function that works off one unit, here or wherever the executor sends it."""
+) -> Iterator[tuple[Callable[[Unit], Outcome], Progress]]:
+    """Give the function that works off one unit, here or wherever the executor sends it, and who is told of each."""
     if options.executor.parallel == 1:
-        yield partial(_attempt, worker)
+        yield partial(_attempt, worker), silent  # the stages of a unit show themselves
         return
     # Elsewhere the same folder may be another one: paths must not depend on where a process stands.
     place = _Place(matrix.model_dump_json(), logs.resolve(), out.resolve(), options.grids.resolve(), options.device)
-    total = len(plan_units(matrix))
     with stage("rows") as progress:
-        progress(0, total)
-        yield partial(_attempt_elsewhere, place)
-        progress(total, total)
+        yield partial(_attempt_elsewhere, place), progress
 
 
 class _Place(NamedTuple):
@@ -160,11 +153,8 @@ def _attempt_elsewhere(place: _Place, unit: Unit) -> Outcome:
 @lru_cache(maxsize=1)
 def _worker_at(place: _Place) -> Worker:
     """Make the worker of a process that gets units of one run; it keeps the grids between them."""
-    keep_freed_memory()
-    matrix = Matrix.model_validate_json(place.matrix)
-    device = choose_device(place.device)
-    sources = Sources(place.logs, place.grids, matrix.rows, executor=InProcess(), device=device, stage=silent_stage)
-    return Worker(place.out, sources, device, matrix.seed, silent_stage)
+    options = RunOptions(place.device, place.grids, command="")
+    return make_worker(Matrix.model_validate_json(place.matrix), place.logs, place.out, options, silent_stage)
 
 
 def wanted_keys(matrix: Matrix, only: tuple[str, ...]) -> set[str]:
@@ -174,7 +164,7 @@ def wanted_keys(matrix: Matrix, only: tuple[str, ...]) -> set[str]:
         if name not in names:
             raise ConfigError(f"{name!r} is not a row of this matrix: {', '.join(sorted(names))}", field="row")
     chosen = [row for row in matrix.rows if not only or row.name in only]
-    return {key for row in chosen for key, _ in _units_of(row, matrix.seed)}
+    return {key for row in chosen for key, _ in units_of(row, matrix.seed)}
 
 
 def _finished(worker: Worker, unit: Unit) -> Outcome | None:
@@ -188,28 +178,30 @@ def _finished(worker: Worker, unit: Unit) -> Outcome | None:
 
 def _attempt(worker: Worker, unit: Unit) -> Outcome:
     try:
-        result_id, left_out = worker.run(unit.row, unit.seed)
+        job = worker.run(unit.row, unit.seed)
     except SemgridError as error:
         return Outcome(None, str(error), {})
-    return Outcome(result_id, None, left_out)
+    return Outcome(job.result_id, None, job.left_out)
 
 
-def _units_of(row: Row, first_seed: int) -> Iterator[tuple[str, Unit]]:
+def units_of(row: Row, first_seed: int) -> Iterator[tuple[str, Unit]]:
+    """Give the units of a row with the keys by which rows that mean the same share them."""
     seeds = range(first_seed, first_seed + row.repeats) if row.trained else [None]
     for seed in seeds:
         yield digest_value([identity(row), seed]), Unit(row, seed)
 
 
 def _record(
-    matrix: Matrix, command: str, started: _Clock, device: torch.device, sources: Sources, outcomes: dict[str, Outcome]
+    matrix: Matrix, command: str, started: _Clock, worker: Worker, outcomes: dict[str, Outcome]
 ) -> results.RunRecord:
+    sources = worker.sources
     return results.RunRecord(
         format_version=results.FORMAT_VERSION,
         title=matrix.title,
         command=command,
         matrix=matrix.model_dump(mode="json"),
         versions=versions(),
-        machine=machine(device),
+        machine=machine(worker.device),
         started=started.utc,
         seconds=started.seconds(),
         logs=tuple(sources.records[key] for key in sorted(sources.records)),
@@ -228,7 +220,7 @@ def _too_short(outcomes: dict[str, Outcome]) -> dict[str, str]:
 
 
 def _row_record(row: Row, first_seed: int, outcomes: dict[str, Outcome]) -> results.RowRecord:
-    done = [outcomes[key] for key, _ in _units_of(row, first_seed) if key in outcomes]
+    done = [outcomes[key] for key, _ in units_of(row, first_seed) if key in outcomes]
     failures = [outcome.failure for outcome in done if outcome.failure is not None]
     found = [outcome.result_id for outcome in done if outcome.result_id is not None]
     return results.RowRecord(

@@ -1,10 +1,8 @@
 """One unit of a run: one row with one seed, trained if need be, scored, and kept under the digest of all of it."""
 
 import shutil
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -14,7 +12,7 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import ResultError
 from semgrid_eval.files import atomic_folder, digest_files, digest_value
 from semgrid_eval.models.baselines import FuseAll, OverlaySensors, RepeatNewest
-from semgrid_eval.models.checkpoint import HISTORY_FILE
+from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
 from semgrid_eval.models.device import choose_precision
 from semgrid_eval.models.flow import MoveOn
 from semgrid_eval.models.network import NetworkPredictor
@@ -27,7 +25,7 @@ from semgrid_eval.runs.sources import Sources, grid_digest
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
 from semgrid_eval.sequences.dataset import WindowSet, select_windows, window_arrays
-from semgrid_eval.sequences.windows import WindowConfig, WindowPlan, training_windows, validation_windows
+from semgrid_eval.sequences.windows import training_windows, validation_windows
 
 
 class Worker:
@@ -42,7 +40,7 @@ class Worker:
     """
 
     def __init__(self, out: Path, sources: Sources, device: torch.device, example_seed: int, stage: Stage) -> None:
-        self._out, self._sources, self.device, self._stage = out, sources, device, stage
+        self._out, self.sources, self.device, self._stage = out, sources, device, stage
         self._example_seed = example_seed
 
     def look(self, row: Row, seed: int | None) -> "Job":
@@ -51,17 +49,20 @@ class Worker:
         Raises:
             SemgridError: the row cannot be run; the message says why.
         """
-        scored = self._window_set(row, row.validation_split, row.scored_window, validation_windows)
+        data = self.sources.data(row.grid, row.validation_split)
+        plan = validation_windows(data.frame_counts, row.scored_window)
+        scored = select_windows(data, plan.windows, sensors=row.sensors, translate=row.translate)
         windows_id = digest_value([scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
-        training = self._training(row, seed) if seed is not None else None
-        counted = self._window_set(row, row.train_split, row.window, training_windows) if row.model == "table" else None
+        training = self._training(row, seed, scored) if seed is not None else None
+        counted = self._training_windows(row) if row.model == "table" else None
         config = _config(row)
         learned_from = training.id if training else counted.digest() if counted is not None else None
         result_id = digest_value([results.FORMAT_VERSION, config, windows_id, learned_from])
-        return Job(result_id, config, scored, windows_id, training, counted, self._too_short(row))
+        left_out = {self.sources.log_of[data.recordings[index]]: why for index, why in plan.too_short.items()}
+        return Job(result_id, config, scored, windows_id, training, counted, left_out)
 
-    def run(self, row: Row, seed: int | None) -> "Finished":
-        """Make sure that the result of a row with one seed lies in the run's folder.
+    def run(self, row: Row, seed: int | None) -> "Job":
+        """Make sure that the result of a row with one seed lies in the run's folder, and return what was resolved.
 
         Raises:
             SemgridError: the row cannot be run; the message says why.
@@ -70,7 +71,7 @@ class Worker:
         folder = results.result_folder(self._out, job.result_id)
         self._keep_windows(job.scored, job.windows_id)
         if self.is_done(job):
-            return Finished(job.result_id, job.left_out)
+            return job
         trained = self._train(job.training, row) if job.training else None
         predictor = _predictor(row, trained, job.counted)
         with self._stage(f"score {row.name}") as progress:
@@ -82,15 +83,15 @@ class Worker:
             log_digests=tuple(sorted(set(job.scored.data.digests))),
             seed=seed,
             windows_id=job.windows_id,
-            windows=_window_records(job.scored, self._sources.log_of),
+            windows=_window_records(job.scored, self.sources.log_of),
             device=str(self.device),
             train_seconds=round(trained.seconds, 3) if trained else None,
             predict_seconds=round(evaluation.seconds, 6),
             parameters=trained.network.parameter_count if trained else None,
         )
-        history = job.training.folder / HISTORY_FILE if job.training else None
+        history = job.training.folder / TRAINING_HISTORY_FILE if job.training else None
         _keep_result(folder, record, evaluation, history, with_predictions=self._shows(seed))
-        return Finished(job.result_id, job.left_out)
+        return job
 
     def is_done(self, job: "Job") -> bool:
         """Tell whether all that a job leaves lies in the run's folder."""
@@ -101,21 +102,13 @@ class Worker:
     def _shows(self, seed: int | None) -> bool:
         return seed in (None, self._example_seed)
 
-    def _window_set(
-        self, row: Row, split: str, config: WindowConfig, plan: Callable[[list[int], WindowConfig], WindowPlan]
-    ) -> WindowSet:
-        data = self._sources.data(row.grid, split)
-        windows = plan(data.frame_counts, config).windows
+    def _training_windows(self, row: Row) -> WindowSet:
+        data = self.sources.data(row.grid, row.train_split)
+        windows = training_windows(data.frame_counts, row.window).windows
         return select_windows(data, windows, sensors=row.sensors, translate=row.translate)
 
-    def _too_short(self, row: Row) -> dict[str, str]:
-        data = self._sources.data(row.grid, row.validation_split)
-        reasons = validation_windows(data.frame_counts, row.scored_window).too_short
-        return {self._sources.log_of[data.recordings[index]]: reason for index, reason in reasons.items()}
-
-    def _training(self, row: Row, seed: int) -> "Training":
-        windows = self._window_set(row, row.train_split, row.window, training_windows)
-        watched = self._window_set(row, row.validation_split, row.scored_window, validation_windows)
+    def _training(self, row: Row, seed: int, watched: WindowSet) -> "Training":
+        windows = self._training_windows(row)
         training_id = digest_value(
             {
                 "network": row.network.model_dump(),
@@ -149,13 +142,6 @@ class Worker:
             read_arrays(path, ("inputs", "target", "mask"))
         except ResultError:  # not there yet, or damaged
             write_arrays(path, window_arrays(windows))
-
-
-class Finished(NamedTuple):
-    """A result that lies in the run's folder, and the logs that gave it no window, with the reason."""
-
-    result_id: str
-    left_out: dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -252,7 +238,7 @@ def _keep_result(
         results.write_counts(partial, evaluation.counts, evaluation.region_counts)
         if with_predictions:
             arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
-            write_arrays(partial / "predictions.npz", arrays)
+            write_arrays(partial / results.PREDICTIONS_FILE, arrays)
         if history:
-            shutil.copyfile(history, partial / "history.csv")
+            shutil.copyfile(history, partial / results.HISTORY_FILE)
         results.write_result(partial, record)
