@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from semgrid_eval.arrays import read_arrays
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file
 from semgrid_eval.report.pictures import grid_png
-from semgrid_eval.scores.results import read_arrays, read_result, read_run, result_folder, windows_file
+from semgrid_eval.scores.results import read_result, read_run, result_folder, windows_file
 
 WINDOWS = 4
 SCALE = 2

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.arrays import read_arrays
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.report.cells import number, signed
 from semgrid_eval.report.examples import Contest, Pick, key_of, positions
 from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, certainty_png, data_uri, grid_png, right_png
 from semgrid_eval.report.reading import Result
-from semgrid_eval.scores.results import read_arrays, windows_file
+from semgrid_eval.scores.results import PREDICTIONS_FILE, windows_file
 
 Grid = NDArray[np.uint8]
 
@@ -79,7 +80,7 @@ def _draw(contest: Contest, picks: Sequence[Pick]) -> Iterator[Example]:
     result, at = contest.result, [pick.index for pick in picks]
     path = windows_file(contest.model.run, result.record.windows_id)
     shown = _read(path, ("inputs", "target", "mask"), at)
-    mine = _read(result.folder / "predictions.npz", ("prediction", "certainty"), at)
+    mine = _read(result.folder / PREDICTIONS_FILE, ("prediction", "certainty"), at)
     rivals = {rival.name: _rival_predictions(result, rival.shown, at) for rival in contest.rivals}
     for i, pick in enumerate(picks):
         window = result.record.windows[pick.index]
@@ -137,7 +138,7 @@ def _rival_predictions(result: Result, rival: Result, at: Sequence[int]) -> list
     places = positions(rival)
     found = [places.get(key_of(result.record.windows[i])) for i in at]
     there = [i for i in found if i is not None]
-    grids = iter(_read(rival.folder / "predictions.npz", ("prediction",), there)["prediction"]) if there else iter(())
+    grids = iter(_read(rival.folder / PREDICTIONS_FILE, ("prediction",), there)["prediction"]) if there else iter(())
     return [None if i is None else np.asarray(next(grids), np.uint8) for i in found]
 
 

@@ -12,6 +12,7 @@ from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores.results import (
+    PREDICTIONS_FILE,
     ResultRecord,
     RowRecord,
     RunRecord,
@@ -56,7 +57,7 @@ class Row:
     @property
     def shown(self) -> Result:
         """The result to show pictures of: the first one that kept its predictions."""
-        kept = (result for result in self.results if (result.folder / "predictions.npz").is_file())
+        kept = (result for result in self.results if (result.folder / PREDICTIONS_FILE).is_file())
         return next(kept, self.results[0])
 
     @property

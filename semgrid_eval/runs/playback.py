@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.arrays import read_arrays
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import InputError, LogError, ResultError
 from semgrid_eval.files import atomic_file, write_json
@@ -25,11 +26,11 @@ from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.runs.viewer_layout import prediction_topic, viewer_layout
 from semgrid_eval.scores.results import (
+    PREDICTIONS_FILE,
     ResultRecord,
     RowRecord,
     RunRecord,
     WindowRecord,
-    read_arrays,
     read_result,
     read_run,
     result_folder,
@@ -141,14 +142,14 @@ def _row(record: RunRecord, name: str, run: Path) -> RowRecord:
 
 def _read_scored(run: Path, row: RowRecord) -> _Scored:
     folders = [result_folder(run, result_id) for result_id in row.results]
-    folder = next((folder for folder in folders if (folder / "predictions.npz").is_file()), None)
+    folder = next((folder for folder in folders if (folder / PREDICTIONS_FILE).is_file()), None)
     if folder is None:
         raise InputError("none of its results kept its predictions", path=run, field=f"row {row.name}")
     record = read_result(folder)
     grid = parse_config(GridConfig, record.config.get("grid"), path=folder / "result.json")
     windows = windows_file(run, record.windows_id)
     arrays = {
-        **read_arrays(folder / "predictions.npz", ("prediction", "certainty")),
+        **read_arrays(folder / PREDICTIONS_FILE, ("prediction", "certainty")),
         **read_arrays(windows, ("inputs", "target", "mask")),
     }
     _check_shapes(arrays, record, row, grid, folder)

@@ -22,8 +22,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from semgrid_eval.arrays import read_arrays as read_arrays
-from semgrid_eval.arrays import write_arrays as write_arrays
+from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import ConfigError, InputError, ResultError
