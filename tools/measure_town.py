@@ -40,14 +40,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     measure_speeds(options.out, options.speeds, options.seed)
-    for noise, (width, height) in SIZES_PX.items():
+    for stereo, (width, height) in SIZES_PX.items():
         config = SyntheticConfig(
-            recordings=options.recordings, seed=options.seed, noise=noise, width=width, height=height
+            recordings=options.recordings, seed=options.seed, stereo=stereo, width=width, height=height
         )
         plans = plan_recordings(config, options.out, _quiet)
         measure_rendering(plans[0])
         measure_disparity(plans)
-        draw_sheet(plans[:: max(1, len(plans) // 6)], options.out / f"sheet_{noise}.png")
+        draw_sheet(plans[:: max(1, len(plans) // 6)], options.out / f"sheet_{stereo}.png")
 
 
 def measure_speeds(cache: Path, count: int, seed: int) -> None:
@@ -70,7 +70,7 @@ def measure_rendering(plan: RecordingPlan) -> None:
     frames = sum(1 for _ in render_recording(plan).moments())
     cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
     size = f"{plan.width_px} x {plan.height_px}"
-    print(f"{plan.noise}, {size}: {frames} frames in {wall_s:.2f} s ({cpu_s:.2f} s of processor time)")
+    print(f"{plan.stereo}, {size}: {frames} frames in {wall_s:.2f} s ({cpu_s:.2f} s of processor time)")
 
 
 def measure_disparity(plans: list[RecordingPlan]) -> None:

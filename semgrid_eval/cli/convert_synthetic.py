@@ -60,7 +60,7 @@ def _option(name: str, kind: "type | click.Choice[str]", text: str) -> Callable[
 @_option("duration_s", float, "Simulated time of a town from which recordings are taken.")
 @_option("width", int, "Of the images in pixels.")
 @_option("height", int, "Of the images in pixels.")
-@_option("noise", click.Choice(["modelled", "matched", "exact"]), "Errors of labels, disparity and motion.")
+@_option("stereo", click.Choice(["modelled", "matched", "exact"]), "Errors of labels, disparity and motion.")
 @click.option(
     "--cache", type=click.Path(path_type=Path, file_okay=False), help="Folder of towns.  [default: OUT/.towns]"
 )

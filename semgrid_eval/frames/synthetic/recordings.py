@@ -26,7 +26,7 @@ class SyntheticConfig(Config):
         seed: the same seed gives the same bytes.
         width: of the images in pixels.
         height: of the images in pixels.
-        noise: `modelled` gives labels, disparity and motion their errors; `matched` does, too, but gets disparity by
+        stereo: `modelled` gives labels, disparity and motion their errors; `matched` does, too, but gets disparity by
             matching a rendered stereo pair; `exact` gives none.
         towns: how many; each belongs to one split only.
         val_share: of the recordings, and of the towns, that are for validation.
@@ -38,7 +38,7 @@ class SyntheticConfig(Config):
     seed: Annotated[int, Field(ge=0, lt=1 << 31)] = 0
     width: Annotated[int, Field(ge=64, le=4096)] = 512
     height: Annotated[int, Field(ge=32, le=2048)] = 256
-    noise: Literal["modelled", "matched", "exact"] = "modelled"
+    stereo: Literal["modelled", "matched", "exact"] = "modelled"
     towns: Annotated[int, Field(ge=1, le=100)] = 4
     val_share: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.3
     town_size_m: Annotated[float, Field(ge=250.0, le=2000.0)] = 450.0
@@ -126,7 +126,7 @@ def _plans_of_town(config: SyntheticConfig, share: _Share, folder: Path, first: 
             seed=(spec.seed, spec.index, 2, position),
             width_px=config.width,
             height_px=config.height,
-            noise=config.noise,
+            stereo=config.stereo,
         )
         for position, chosen in enumerate(drives)
     ]

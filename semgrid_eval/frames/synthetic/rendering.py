@@ -40,7 +40,8 @@ class RecordingPlan:
         seed: of the recording's random numbers.
         width_px: of the images.
         height_px: of the images.
-        noise: `modelled`, `matched`, or `exact` for perfect labels, disparity and motion.
+        stereo: `modelled`, `matched`, or `exact` for perfect labels, disparity and motion.
+        dataset: named in the log.
     """
 
     name: str
@@ -51,7 +52,8 @@ class RecordingPlan:
     seed: tuple[int, ...]
     width_px: int
     height_px: int
-    noise: str
+    stereo: str
+    dataset: str = "synthetic"
 
     @property
     def digest(self) -> str:
@@ -76,7 +78,7 @@ def render_recording(plan: RecordingPlan) -> Recording:
     description = json.dumps(plan.description(), indent=2, sort_keys=True) + "\n"
     return Recording(
         name=plan.name,
-        dataset="synthetic",
+        dataset=plan.dataset,
         split=plan.split,
         calibrations={CAMERA_NAME: calibration},
         source_digest=plan.digest,
@@ -92,10 +94,10 @@ def _moments(plan: RecordingPlan) -> Iterator[Moment]:
     stamps, reports, light, errors = np.random.default_rng(plan.seed).spawn(4)
     times_s = plan.drive.start_s + np.arange(FRAME_COUNT) / FRAME_RATE_HZ
     times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, FRAME_COUNT - 1))
-    motion_noise = motion.EXACT_MOTION if plan.noise == "exact" else motion.MotionNoise()
+    motion_noise = motion.EXACT_MOTION if plan.stereo == "exact" else motion.MotionNoise()
     reported = motion.report(path, times_s, motion_noise, reports)
     camera = Camera(cityscapes_camera(plan.width_px, plan.height_px), plan.width_px, plan.height_px)
-    rig = Rig(camera, plan.noise, errors)
+    rig = Rig(camera, plan.stereo, errors)
     stage = Stage(town, rig.cameras, draw_sunlight(light), path.at(float(times_s[0]))[:2])
     for time_s, (speed_mps, yaw_rate_radps) in zip(times_s, reported, strict=True):
         stamp_ns = round(float(time_s) * 1e9)

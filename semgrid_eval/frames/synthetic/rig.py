@@ -29,16 +29,16 @@ class Rig:
 
     Args:
         camera: whose frames the recording holds.
-        noise: `modelled` or `matched` disparity, or `exact`: neither disparity nor labels have errors.
+        stereo: `modelled` or `matched` disparity, or `exact`: neither disparity nor labels have errors.
         rng: draws the errors.
     """
 
-    def __init__(self, camera: Camera, noise: str, rng: np.random.Generator) -> None:
+    def __init__(self, camera: Camera, stereo: str, rng: np.random.Generator) -> None:
         disparities, labels = rng.spawn(2)
         self._camera = camera
-        self._labels = None if noise == "exact" else LabelErrors(LabelNoise(), labels)
-        self._errors = DisparityErrors(DisparityNoise(), disparities) if noise == "modelled" else None
-        self._matcher = StereoMatcher(camera, disparities) if noise == "matched" else None
+        self._labels = None if stereo == "exact" else LabelErrors(LabelNoise(), labels)
+        self._errors = DisparityErrors(DisparityNoise(), disparities) if stereo == "modelled" else None
+        self._matcher = StereoMatcher(camera, disparities) if stereo == "matched" else None
 
     @property
     def cameras(self) -> tuple[Camera, ...]:

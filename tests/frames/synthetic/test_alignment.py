@@ -33,7 +33,7 @@ def grids(tmp_path_factory):
     found = []
     for plan in farthest:
         log = tmp_path_factory.mktemp("logs") / "town.mcap"
-        recording = render_recording(replace(plan, noise="exact", width_px=512, height_px=256))
+        recording = render_recording(replace(plan, stereo="exact", width_px=512, height_px=256))
         write_log(replace(recording, moments=lambda start=recording.moments: islice(start(), FRAMES)), log)
         found.append(nearly_whole_cells_apart(build_log(log, GridConfig(integrator="arc"))[0]))
     return found

@@ -33,7 +33,7 @@ def moments(plans):
 
 @pytest.fixture(scope="module")
 def exact_moments():
-    return list(render_recording(small_plans(noise="exact")[0]).moments())
+    return list(render_recording(small_plans(stereo="exact")[0]).moments())
 
 
 def pixels(png: bytes):
@@ -205,7 +205,7 @@ def test_more_windows_than_the_traffic_holds_are_refused_with_what_to_do():
         ({"recordings": 10**9}, "recordings"),
         ({"width": 100_000}, r"width: .*4096"),
         ({"height": 1}, "height"),
-        ({"noise": "none"}, "noise"),
+        ({"stereo": "none"}, "stereo"),
         ({"towns": 1}, "different towns"),
         ({"town_size_m": 1e9}, "town_size_m"),
         ({"val_share": 1.0}, "val_share"),
@@ -223,7 +223,7 @@ def test_a_town_that_was_removed_is_named(plans, tmp_path):
 
 
 def test_matched_disparity_is_near_the_truth_where_it_is_found():
-    plan = replace(small_plans()[0], noise="matched", width_px=512, height_px=256)
+    plan = replace(small_plans()[0], stereo="matched", width_px=512, height_px=256)
     frame = front(next(iter(render_recording(plan).moments())))
     exact, found = (pixels(png).astype(float) for png in (frame.exact_disparity_png, frame.disparity_png))
     assert found.shape == (256, 512)
