@@ -44,7 +44,8 @@ class Row(Config):
         overlay: which sensor the `overlay` baseline draws last (reading 20).
         flow: what the `flow` baseline takes as evidence of motion.
         repeats: trainings with different seeds.
-        validation_window: where it differs from `window`, for recordings of another frame rate; same number of inputs.
+        validation_window: where it differs from `window`, for recordings of another frame rate; what a file leaves out
+            is as in `window`, and the number of inputs has to be.
     """
 
     name: str = Field(min_length=1, max_length=200)
@@ -129,10 +130,21 @@ class _Axes(Config):
 
 
 class _MatrixFile(Config):
+    """What a matrix file may hold.
+
+    Args:
+        extends: a preset, or a file beside this one, whose rows, defaults and seed this one starts from. Defaults are
+            merged key by key; so is a row into the base's row of the same written name; other rows come after those.
+        without: written names of the base's rows to leave out.
+        title: the name of the file if not given, also where it extends another.
+    """
+
+    extends: str | None = None
+    without: list[str] = Field(default_factory=list)
     title: str = Field("", max_length=200)
-    seed: int = Field(0, ge=0)
+    seed: int | None = Field(None, ge=0)
     defaults: dict[str, Any] = Field(default_factory=dict)
-    rows: list[dict[str, Any]] = Field(min_length=1)
+    rows: list[dict[str, Any]] = Field(default_factory=list)
 
 
 def preset_names() -> list[str]:
@@ -147,23 +159,72 @@ def load_matrix(name_or_path: str) -> Matrix:
     Raises:
         ConfigError: names file, row and key at fault.
     """
-    if name_or_path in preset_names():
-        with resources.as_file(resources.files("semgrid_eval.presets") / f"{name_or_path}.yaml") as path:
-            return _parse(load_yaml(path), Path(f"preset {name_or_path}"))
-    path = Path(name_or_path)
-    if not path.is_file():
-        raise ConfigError(f"is neither a file nor a preset ({', '.join(preset_names())})", path=path)
-    return _parse(load_yaml(path), path)
+    return _resolve(*_read(name_or_path))
 
 
-def _parse(value: object, path: Path) -> Matrix:
+def _read(name: str, *above: Path) -> tuple[_MatrixFile, Path]:
+    """Read a preset or a file with all that it extends; `above` are the files that extend it, the nearest last."""
+    path, value = _load(name, *above)
     file = parse_config(_MatrixFile, value, path=path)
+    if file.extends is None:
+        if file.without:
+            raise ConfigError("names rows of a base, and there is no `extends`", path=path, field="without")
+        return file, path
+    if path.resolve() in [other.resolve() for other in above]:
+        raise ConfigError(f"{file.extends!r} leads back to this file", path=path, field="extends")
+    base, base_path = _read(file.extends, *above, path)
+    _resolve(base, base_path)  # a fault of the base is named as such
+    return _extended(base, file, path), path
+
+
+def _load(name: str, *above: Path) -> tuple[Path, object]:
+    if name in preset_names():
+        with resources.as_file(resources.files("semgrid_eval.presets") / f"{name}.yaml") as place:
+            return Path(f"preset {name}"), load_yaml(place)
+    path = above[-1].parent / name if above else Path(name)
+    if path.is_file():
+        return path, load_yaml(path)
+    fault = f"is neither a file nor a preset ({', '.join(preset_names())})"
+    if above:
+        raise ConfigError(f"{path} {fault}", path=above[-1], field="extends")
+    raise ConfigError(fault, path=path)
+
+
+def _extended(base: _MatrixFile, file: _MatrixFile, path: Path) -> _MatrixFile:
+    """Put a file over the one that it extends."""
+    names = [_written_name(row) for row in base.rows]
+    for name in file.without:
+        if name not in names:
+            raise ConfigError(
+                f"{name!r} is not a row of {file.extends}: {', '.join(names)}", path=path, field="without"
+            )
+    rows = [row for name, row in zip(names, base.rows, strict=True) if name not in file.without]
+    unchanged = {_written_name(row): place for place, row in enumerate(rows)}
+    for row in file.rows:
+        # A row is changed once; written again it is a new one, whose name is taken.
+        place = unchanged.pop(_written_name(row), None)
+        if place is None:
+            rows.append(row)
+        else:
+            rows[place] = _merge(rows[place], row)
+    seed = base.seed if file.seed is None else file.seed
+    return _MatrixFile(title=file.title, seed=seed, defaults=_merge(base.defaults, file.defaults), rows=rows)
+
+
+def _written_name(row: dict[str, Any]) -> str:
+    """Return a row's name before axes fill it in."""
+    return str(row.get("name", ""))
+
+
+def _resolve(file: _MatrixFile, path: Path) -> Matrix:
     rows = [parse_config(Row, row, path=f"{path}: {place}") for place, row in _expanded(file, path)]
+    if not rows:
+        raise ConfigError("there is no row", path=path, field="rows")
     names = [row.name for row in rows]
     for name in names:
         if names.count(name) > 1:
             raise ConfigError(f"{name!r} is the name of {names.count(name)} rows", path=path, field="rows.name")
-    return Matrix(title=file.title or path.stem, seed=file.seed, rows=tuple(rows))
+    return Matrix(title=file.title or path.stem, seed=file.seed or 0, rows=tuple(rows))
 
 
 def _expanded(file: _MatrixFile, path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -177,7 +238,11 @@ def _expanded(file: _MatrixFile, path: Path) -> Iterator[tuple[str, dict[str, An
             number += 1
             if number > ROW_LIMIT:
                 raise ConfigError(f"gives more than {ROW_LIMIT} rows", path=path, field="axes")
-            yield place, _fill(merged, values, f"{path}: {place}")
+            filled = _fill(merged, values, f"{path}: {place}")
+            window, scored = filled.get("window", {}), filled.get("validation_window")
+            if isinstance(window, dict) and isinstance(scored, dict):
+                filled["validation_window"] = _merge(window, scored)
+            yield place, filled
 
 
 def _combinations(axes: _Axes, place: str) -> Iterator[dict[str, Any]]:
@@ -196,7 +261,7 @@ def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, 
         for part in reversed(key.split(".")):
             nested = {part: nested}
         row = _merge(row, nested)
-    name = str(row.get("name", ""))
+    name = _written_name(row)
     for key, value in values.items():
         name = name.replace("{" + key + "}", str(value))
     if "{" in name:

@@ -89,7 +89,7 @@ def test_rows_override_defaults_key_by_key(tmp_path):
         ([{"name": "a{network.depth}", "model": "ed"}], "has a place that no axis fills"),
         ([{"name": "a", "model": "ed", "axes": {"zip": {"x": [1], "y": [1, 2]}}}], "lists of 1 and 2 values"),
         ([{"name": "a", "model": "ed", "window": {"inputs": 9}}], "target_frame 25 is too early"),
-        ([], "rows: .*at least 1"),
+        ([], "rows: there is no row"),
     ],
 )
 def test_faults_name_file_row_and_key(tmp_path, rows, message):
@@ -100,3 +100,89 @@ def test_faults_name_file_row_and_key(tmp_path, rows, message):
 def test_a_name_that_is_neither_file_nor_preset_lists_the_presets():
     with pytest.raises(ConfigError, match=r"papre: is neither a file nor a preset \(.*paper.*\)"):
         load_matrix("papre")
+
+
+def write(folder, **files):
+    for name, content in files.items():
+        (folder / f"{name}.yaml").write_text(yaml.safe_dump(content))
+
+
+def test_a_matrix_extends_another_one_beside_it_key_by_key(tmp_path):
+    rows = [{"name": name, "model": "ed", "network": {"depth": 2}} for name in ("a", "b", "c")]
+    write(tmp_path, base={"seed": 7, "title": "Base", "defaults": {"network": {"features": 8}}, "rows": rows})
+    changes = [{"name": "c", "network": {"features": 16}}, {"name": "d", "model": "newest"}]
+    write(tmp_path, mine={"extends": "base.yaml", "without": ["b"], "defaults": {"repeats": 2}, "rows": changes})
+    matrix = load_matrix(str(tmp_path / "mine.yaml"))
+    assert (matrix.title, matrix.seed) == ("mine", 7)
+    assert [(row.name, row.network.depth, row.network.features, row.repeats) for row in matrix.rows] == [
+        ("a", 2, 8, 2),
+        ("c", 2, 16, 2),
+        ("d", 3, 8, 2),
+    ]
+
+
+def test_a_matrix_that_extends_a_preset_changes_a_row_before_its_axes(tmp_path):
+    row = {"name": "ED-SL{window.inputs}", "axes": {"grid": {"window.inputs": [2, 3]}}}
+    names = [row.name for row in load(tmp_path, {"extends": "paper", "rows": [row]}).rows]
+    paper = [row.name for row in load_matrix("paper").rows]
+    assert names == [name for name in paper if name not in ("ED-SL4", "ED-SL5")]
+
+
+def test_paper_cpu_has_the_rows_of_paper_and_the_stronger_baselines():
+    paper, scaled = (load_matrix(name).rows for name in ("paper", "paper-cpu"))
+    assert [row.name for row in scaled] == [row.name for row in paper] + ["BL-Fuse", "BL-Table", "BL-Flow"]
+    scaling = {"network", "training", "repeats"}
+    for full, small in zip(paper, scaled, strict=False):
+        assert full.model_dump(exclude=scaling) == small.model_dump(exclude=scaling)
+    assert {(row.network.features, row.training.batch, row.repeats) for row in scaled} == {(32, 8, 1)}
+    assert {row.training.updates_until(row.training.epochs) for row in scaled} == {3000}
+
+
+def test_a_validation_window_is_as_the_window_where_it_says_nothing(tmp_path):
+    row = {
+        "name": "n{window.inputs}",
+        "model": "newest",
+        "validation_window": {"step_frames": 3, "target_frame": None},
+        "axes": {"grid": {"window.inputs": [2, 3]}},
+    }
+    rows = load(tmp_path, {"defaults": {"window": {"horizon_steps": 2}}, "rows": [row]}).rows
+    assert [(r.scored_window.inputs, r.scored_window.horizon_steps, r.scored_window.step_frames) for r in rows] == [
+        (2, 2, 3),
+        (3, 2, 3),
+    ]
+    assert {r.window.step_frames for r in rows} == {5}
+
+
+@pytest.mark.parametrize(
+    ("mine", "message"),
+    [
+        ({"extends": "nowhere"}, r"mine\.yaml: extends: .*nowhere is neither a file nor a preset \(.*paper.*\)$"),
+        ({"extends": "mine.yaml"}, r"mine\.yaml: extends: 'mine\.yaml' leads back to this file"),
+        ({"extends": "back.yaml"}, r"mine\.yaml: extends: 'back\.yaml' leads back to this file"),
+        ({"extends": "broken.yaml"}, r"broken\.yaml: row 'a': netwrok: unknown key"),
+        (
+            {"extends": "good.yaml", "rows": [{"name": "a", "netwrok": {}}]},
+            r"mine\.yaml: row 'a': netwrok: unknown key",
+        ),
+        ({"extends": "good.yaml", "without": ["b"]}, r"mine\.yaml: without: 'b' is not a row of good\.yaml: a$"),
+        ({"extends": "good.yaml", "without": ["a"]}, r"mine\.yaml: rows: there is no row"),
+        (
+            {"extends": "good.yaml", "rows": [{"name": "a"}, {"name": "a"}]},
+            r"mine\.yaml: row 'a': model: Field required",
+        ),
+        ({"extends": "good.yaml", "rows": [{"name": "a"}, {"name": "a", "model": "ed"}]}, "'a' is the name of 2 rows"),
+        ({"extends": 3}, r"mine\.yaml: extends: .*string"),
+        ({"without": ["a"], "rows": [{"name": "a", "model": "ed"}]}, "without: .* there is no `extends`"),
+        ({"extend": "paper"}, r"mine\.yaml: extend: unknown key; allowed here: defaults, extends, rows, seed, title"),
+    ],
+)
+def test_faults_of_extending_name_the_file_that_is_at_fault(tmp_path, mine, message):
+    write(
+        tmp_path,
+        mine=mine,
+        back={"extends": "mine.yaml"},
+        good={"rows": [{"name": "a", "model": "newest"}]},
+        broken={"rows": [{"name": "a", "model": "newest", "netwrok": {}}]},
+    )
+    with pytest.raises(ConfigError, match=message):
+        load_matrix(str(tmp_path / "mine.yaml"))
