@@ -1,11 +1,60 @@
 import shlex
+import shutil
 
 import pytest
 from click.testing import CliRunner
+from support.towns import SMALL, town_cache
 
+from semgrid_eval.cli import convert_synthetic
 from semgrid_eval.cli.convert_synthetic import synthetic
 from semgrid_eval.cli.main import cli, main
+from semgrid_eval.frames.synthetic.benchmark import BenchmarkSize, SplitSize, load_benchmark, versions
+from semgrid_eval.log.fingerprint import fingerprint
 from semgrid_eval.log.store import LogReader, find_logs
+
+LABELS = ("train/town00_000000_000000", "val/town01_000001_000000")
+
+
+def run(capsys, *arguments):
+    """Run the command line; return its exit code and the lines on stderr."""
+    with pytest.raises(SystemExit) as stopped:
+        main(["convert", "synthetic", *(str(argument) for argument in arguments)])
+    return stopped.value.code, capsys.readouterr().err.splitlines()
+
+
+def tiny(fingerprints=None, made_with=None):
+    """Make a benchmark of two recordings, one a split."""
+    one, town = SplitSize(recordings=1, towns=1), {key: SMALL[key] for key in ("town_size_m", "duration_s")}
+    size = BenchmarkSize(
+        seed=SMALL["seed"], train=one, val=one, fingerprints=fingerprints, versions=made_with or versions()
+    )
+    changes = {"width": 128, "height": 64, **town, "sizes": {"small": size}}
+    return load_benchmark("town-v1").model_copy(update=changes)
+
+
+@pytest.fixture
+def define(monkeypatch):
+    """Return what replaces the benchmark by a tiny one."""
+    return lambda *given: monkeypatch.setattr(convert_synthetic, "load_benchmark", lambda name: tiny(*given))
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    """Logs of the tiny benchmark, rendered once in this process."""
+    out = tmp_path_factory.mktemp("rendered")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(convert_synthetic, "load_benchmark", lambda name: tiny())
+        done = CliRunner().invoke(cli, ["convert", "synthetic", str(out), *benchmark_options(1)])
+    assert done.exit_code == 0, done.output
+    return out, done.output
+
+
+def benchmark_options(workers):
+    return ["--benchmark", "town-v1", "--cache", str(town_cache()), "--workers", str(workers)]
+
+
+def published(out):
+    return " ".join(fingerprint(out / f"{label}.mcap")[:8] for label in LABELS)
 
 
 def test_the_example_writes_logs_and_a_second_run_keeps_them(tmp_path, monkeypatch):
@@ -17,12 +66,86 @@ def test_the_example_writes_logs_and_a_second_run_keeps_them(tmp_path, monkeypat
     logs = find_logs(tmp_path / "logs")
     assert [log.parent.name for log in logs] == ["train", "val"]
     with LogReader(logs[0]) as log:
+        assert log.scene.dataset == "synthetic"
         assert sum(1 for _ in log.frames("front")) == 30
         assert len(list(log.poses())) == 30
     before = [log.stat().st_mtime_ns for log in logs]
     again = CliRunner().invoke(cli, arguments)
     assert "0 written, 2 up to date, 0 failed" in again.output
     assert [log.stat().st_mtime_ns for log in logs] == before
+
+
+def test_an_unpublished_benchmark_tells_its_digest_and_its_logs_carry_its_name(rendered):
+    out, said = rendered
+    assert "town-v1 small: digest " in said
+    assert "nothing is published yet" in said
+    logs = find_logs(out)
+    assert [log.relative_to(out).with_suffix("").as_posix() for log in logs] == list(LABELS)
+    with LogReader(logs[0]) as log:
+        assert log.scene.dataset == "town-v1/small"
+
+
+def test_two_workers_elsewhere_render_the_published_bytes(rendered, define, tmp_path, capsys):
+    out, _ = rendered
+    define(published(out))
+    code, lines = run(capsys, tmp_path, *benchmark_options(2))
+    assert code == 0
+    assert lines[-1].endswith("as published")
+    for label in LABELS:
+        assert (tmp_path / f"{label}.mcap").read_bytes() == (out / f"{label}.mcap").read_bytes()
+
+
+def test_an_interrupted_benchmark_goes_on_where_it_was(rendered, define, tmp_path, capsys):
+    out, _ = rendered
+    define(published(out))
+    (tmp_path / "train").mkdir()
+    shutil.copy(out / f"{LABELS[0]}.mcap", tmp_path / "train")
+    code, lines = run(capsys, tmp_path, *benchmark_options(1))
+    assert code == 0
+    assert f"{tmp_path}: 1 written, 1 up to date, 0 failed" in lines
+    assert lines[-1].endswith("as published")
+
+
+def test_recordings_that_differ_are_a_warning_that_names_versions(rendered, define, capsys):
+    out, _ = rendered
+    train, _ = published(out).split()
+    define(f"{train} 00000000", {**versions(), "eclipse-sumo": "1.0"})
+    code, lines = run(capsys, out, *benchmark_options(1))
+    assert code == 0
+    assert lines[-1].startswith(
+        "Warning: town-v1 small: 1 of 2 recordings differ from the published ones, such as val/"
+    )
+    assert f"published were made with eclipse-sumo 1.0 (here {versions()['eclipse-sumo']})" in lines[-1]
+
+
+def test_logs_that_do_not_belong_are_a_warning(rendered, define, tmp_path, capsys):
+    out, _ = rendered
+    define(published(out))
+    shutil.copytree(out, tmp_path, dirs_exist_ok=True)
+    stray = tmp_path / "val/another.mcap"
+    shutil.copy(out / f"{LABELS[0]}.mcap", stray)
+    code, lines = run(capsys, tmp_path, *benchmark_options(1))
+    assert code == 0
+    assert f"Warning: {tmp_path} holds 1 logs that do not belong to the benchmark, such as {stray}" in lines
+
+
+@pytest.mark.parametrize(
+    "option",
+    [["--recordings", "4"], ["--seed", "0"], ["--stereo", "exact"], ["--town-size-m", "450"], ["--width", "512"]],
+)
+def test_an_option_that_would_change_the_benchmark_is_refused(option, tmp_path, capsys):
+    code, lines = run(capsys, tmp_path, "--benchmark", "town-v1", *option)
+    assert (code, lines) == (1, [f"Error: {option[0]}: is fixed by --benchmark town-v1; leave it out"])
+
+
+def test_a_size_without_a_benchmark_is_refused(tmp_path, capsys):
+    code, lines = run(capsys, tmp_path, "--recordings", 2, "--size", "full")
+    assert (code, lines) == (1, ["Error: --size: is the size of a benchmark; name one with --benchmark"])
+
+
+def test_neither_a_count_nor_a_benchmark_is_refused(tmp_path, capsys):
+    code, lines = run(capsys, tmp_path)
+    assert (code, lines[-1]) == (2, "Error: Missing option '--recordings', or '--benchmark'.")
 
 
 @pytest.mark.parametrize(
@@ -34,9 +157,7 @@ def test_the_example_writes_logs_and_a_second_run_keeps_them(tmp_path, monkeypat
     ],
 )
 def test_an_impossible_wish_is_one_line(option, message, tmp_path, capsys):
-    with pytest.raises(SystemExit) as stopped:
-        main(["convert", "synthetic", str(tmp_path), "--recordings", "2", *option])
-    error = capsys.readouterr().err
-    assert stopped.value.code == 1
-    assert error.startswith(message)
-    assert error.count("\n") == 1
+    code, lines = run(capsys, tmp_path, "--recordings", 2, *option)
+    assert code == 1
+    assert len(lines) == 1
+    assert lines[0].startswith(message)

@@ -1,7 +1,7 @@
 """Plans the recordings of a synthetic data set: which towns, which windows, which split."""
 
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -15,7 +15,9 @@ from semgrid_eval.frames.synthetic.rendering import RecordingPlan, render_record
 from semgrid_eval.frames.synthetic.town import TownSpec, load_town, prepare_town
 from semgrid_eval.progress import Progress
 
-__all__ = ["RecordingPlan", "SyntheticConfig", "plan_recordings", "render_recording"]
+__all__ = ["RecordingPlan", "Stereo", "SyntheticConfig", "plan_recordings", "render_recording"]
+
+Stereo = Literal["modelled", "matched", "exact"]
 
 
 class SyntheticConfig(Config):
@@ -30,6 +32,7 @@ class SyntheticConfig(Config):
             matching a rendered stereo pair; `exact` gives none.
         towns: how many; each belongs to one split only.
         val_share: of the recordings, and of the towns, that are for validation.
+        val_towns: how many towns are for validation, where it is another share than that of the recordings.
         town_size_m: side of the square that a town's streets cover.
         duration_s: simulated time of a town from which windows are taken.
     """
@@ -38,9 +41,10 @@ class SyntheticConfig(Config):
     seed: Annotated[int, Field(ge=0, lt=1 << 31)] = 0
     width: Annotated[int, Field(ge=64, le=4096)] = 512
     height: Annotated[int, Field(ge=32, le=2048)] = 256
-    stereo: Literal["modelled", "matched", "exact"] = "modelled"
+    stereo: Stereo = "modelled"
     towns: Annotated[int, Field(ge=1, le=100)] = 4
     val_share: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.3
+    val_towns: Annotated[int, Field(ge=1)] | None = None
     town_size_m: Annotated[float, Field(ge=250.0, le=2000.0)] = 450.0
     duration_s: Annotated[float, Field(ge=10.0, le=3600.0)] = 90.0
 
@@ -48,11 +52,13 @@ class SyntheticConfig(Config):
     def _splits_need_towns(self) -> Self:
         if self.val_share > 0.0 and self.towns < 2:
             raise ValueError("training and validation need different towns: ask for 2 towns or more, or val_share 0")
+        if self.val_towns is not None and not (self.val_share > 0.0 and self.val_towns < self.towns):
+            raise ValueError("val_towns must leave a town for training, and val_share recordings for validation")
         return self
 
 
 def plan_recordings(
-    config: SyntheticConfig, cache_dir: Path, progress: Progress, *, workers: int = 1
+    config: SyntheticConfig, cache_dir: Path, progress: Progress, *, workers: int = 1, dataset: str = "synthetic"
 ) -> list[RecordingPlan]:
     """Simulate the towns that the cache does not hold yet, and choose the windows of all recordings.
 
@@ -61,6 +67,7 @@ def plan_recordings(
         cache_dir: where towns are kept.
         progress: told of each finished town.
         workers: towns simulated at the same time; the plans do not depend on it.
+        dataset: the name that the logs carry.
 
     Raises:
         InputError: SUMO failed, the cache cannot be written to, or a town's traffic holds too few windows.
@@ -71,7 +78,7 @@ def plan_recordings(
     plans: list[RecordingPlan] = []
     for share, folder in zip(shares, folders, strict=True):
         plans += _plans_of_town(config, share, folder, len(plans))
-    return plans
+    return [replace(plan, dataset=dataset) for plan in plans]
 
 
 @dataclass(frozen=True)
@@ -85,7 +92,7 @@ class _Share:
 
 def _shares(config: SyntheticConfig) -> list[_Share]:
     """Give each split towns of its own, of the same kinds in the same order, and each town its recordings."""
-    val_towns = max(1, round(config.towns * config.val_share)) if config.val_share > 0.0 else 0
+    val_towns = config.val_towns or (max(1, round(config.towns * config.val_share)) if config.val_share > 0.0 else 0)
     val_recordings = round(config.recordings * config.val_share)
     shares: list[_Share] = []
     for split, towns, recordings in (

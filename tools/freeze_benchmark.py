@@ -1,0 +1,46 @@
+"""Publish the digest of a benchmark's logs: writes it, with the versions that made them, into the package's definition.
+
+Example: semgrid-eval convert synthetic town --benchmark town-v1 --size small && python tools/freeze_benchmark.py town
+"""
+
+# ruff: noqa: T201 - the digest goes to stdout
+
+import sys
+from pathlib import Path
+
+from semgrid_eval.executors import available_cores, local_executor
+from semgrid_eval.files import write_json
+from semgrid_eval.frames.synthetic.benchmark import (
+    benchmark_digest,
+    definition_file,
+    load_benchmark,
+    short_fingerprints,
+    versions,
+)
+from semgrid_eval.log.fingerprint import fingerprints
+from semgrid_eval.log.store import LogReader, find_logs
+from semgrid_eval.progress import silent
+
+
+def freeze(out: Path) -> str:
+    """Write the fingerprints of all logs below a folder into the definition of their benchmark; return the digest."""
+    logs = find_logs(out)
+    with LogReader(logs[0]) as log:
+        name, size = log.scene.dataset.split("/")
+    definition = load_benchmark(name).model_dump()
+    chosen = definition["sizes"][size]
+    expected = chosen["train"]["recordings"] + chosen["val"]["recordings"]
+    if len(logs) != expected:
+        raise SystemExit(f"{out} holds {len(logs)} logs, {name} {size} has {expected} recordings")
+    found = fingerprints(logs, executor=local_executor(available_cores()), progress=silent)
+    labels = [log.relative_to(out).with_suffix("").as_posix() for log in logs]
+    short = short_fingerprints(dict(zip(labels, found, strict=True)))
+    chosen |= {"fingerprints": " ".join(short.values()), "versions": versions()}
+    write_json(definition_file(name), definition)
+    return f"{name} {size}: digest {benchmark_digest(short)}"
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        raise SystemExit(__doc__)
+    print(freeze(Path(sys.argv[1])))
