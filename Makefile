@@ -4,10 +4,23 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test check clean
+# Logs and results of the reference run, which is not kept, and its report, which is.
+REFERENCE ?= build/reference
+REFERENCE_REPORT ?= reports/reference
+REFERENCE_LOGS ?= convert synthetic $(REFERENCE)/logs --benchmark town-v1 --size small
+REFERENCE_MATRIX ?= paper-cpu
+REFERENCE_COMMANDS := "$(REFERENCE_LOGS)" \
+  "run $(REFERENCE_MATRIX) --logs $(REFERENCE)/logs --out $(REFERENCE)/run" \
+  "report $(REFERENCE)/run --out $(REFERENCE_REPORT)"
+
+.PHONY: demo test check reference clean
 
 demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo
+
+reference: $(READY)  ## the paper's table on the simulated town, two hours on two cores; goes on where it was stopped
+	for command in $(REFERENCE_COMMANDS); do $(BIN)/semgrid-eval $$command || exit 1; done
+	$(BIN)/python tools/reference_readme.py $(REFERENCE)/run $(REFERENCE_REPORT) $(REFERENCE_COMMANDS)
 
 test: $(READY)  ## the whole suite
 	$(BIN)/python -m pytest -n auto

@@ -1,0 +1,82 @@
+"""Write the README of a reference report: what was run, on what, by which commands, and what came out.
+
+Example: python tools/reference_readme.py build/reference/run reports/reference "run paper-cpu --logs LOGS --out RUN"
+"""
+
+import argparse
+from collections import Counter
+from pathlib import Path
+
+import pandas as pd
+
+from semgrid_eval.files import write_text
+from semgrid_eval.scores.results import ResultRecord, RunRecord, read_result, read_run, result_folder
+
+README = """# {title}
+
+A report made by `make reference`; the page is [index.html](index.html).
+
+| | |
+|---|---|
+{facts}
+
+```sh
+{commands}
+```
+
+## Scores
+
+{scores}
+## The paper's claims on this run
+
+{claims}
+"""
+
+
+def describe(run: Path, report: Path, commands: list[str]) -> str:
+    """Describe a run and its report in Markdown; commands are given without the program's name."""
+    record = read_run(run)
+    done = [read_result(result_folder(run, name)) for name in {name for row in record.rows for name in row.results}]
+    return README.format(
+        title=record.title,
+        facts="\n".join(f"| {name} | {value} |" for name, value in facts(record, done).items()),
+        commands="\n".join(f"semgrid-eval {command}" for command in commands),
+        scores=(report / "summary.md").read_text(encoding="utf-8"),
+        claims=claims(pd.read_csv(report / "findings.csv")),
+    )
+
+
+def facts(record: RunRecord, done: list[ResultRecord]) -> dict[str, str]:
+    """List what a run was made from and what it took."""
+    splits = Counter(log.split for log in record.logs)
+    failed = [row.name for row in record.rows if row.failure]
+    trained = [result.train_seconds for result in done if result.train_seconds is not None]
+    return {
+        "recordings": ", ".join(f"{count} {split}" for split, count in sorted(splits.items())),
+        "data set": ", ".join(sorted({log.dataset for log in record.logs})),
+        "rows": f"{len(record.rows)}" + (f", failed: {', '.join(failed)}" if failed else ""),
+        "trainings": f"{len(trained)}, {sum(trained) / 60:.0f} minutes in all",
+        "started": record.started,
+        "machine": ", ".join(f"{name} {value}" for name, value in sorted(record.machine.items())),
+        "versions": ", ".join(f"{name} {version}" for name, version in sorted(record.versions.items())),
+    }
+
+
+def claims(findings: pd.DataFrame) -> str:
+    """Give a table of the claims with their verdicts."""
+    lines = [f"| {line.claim} | {line.verdict} |" for line in findings.drop_duplicates("name").itertuples()]
+    return "\n".join(["| claim | verdict |", "|---|---|", *lines])
+
+
+def main() -> None:
+    """Write README.md beside the page of a report."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("run", type=Path)
+    parser.add_argument("report", type=Path)
+    parser.add_argument("commands", nargs="+")
+    chosen = parser.parse_args()
+    write_text(chosen.report / "README.md", describe(chosen.run, chosen.report, chosen.commands))
+
+
+if __name__ == "__main__":
+    main()
