@@ -33,6 +33,9 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     "--address", default="local", show_default=True, help="Of a running Ray cluster; 'local' starts one here."
 )
 @click.option("--gpus", type=click.FloatRange(0), default=0.0, help="With Ray: GPUs for each row; fractions share one.")
+@click.option(
+    "--pictures/--no-pictures", default=True, show_default=True, help="Keep small pictures for the report's examples."
+)
 @click.option("--dry-run", is_flag=True, help="Only say what would be done and how long it would take.")
 def command(
     matrix: str,
@@ -46,6 +49,8 @@ def command(
     executor: str,
     address: str,
     gpus: float,
+    *,
+    pictures: bool,
     dry_run: bool,
 ) -> int:
     """Train and score every row of MATRIX, a YAML file or the name of a preset.
@@ -63,7 +68,9 @@ def command(
 
     resolved = load_matrix(matrix)
     rows_on: Executor = local_executor(jobs) if executor == "local" else _ray(address, jobs, gpus)
-    options = RunOptions(device, grids or out / "grids", command_line(), only, rows_on, local_executor(workers))
+    options = RunOptions(
+        device, grids or out / "grids", command_line(), only, rows_on, local_executor(workers), pictures
+    )
     if dry_run:
         return _show_plan(resolved, logs, out, options)
     record = run_matrix(resolved, logs, out, options, stage=progress)

@@ -2,8 +2,8 @@
 
 import datetime
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
@@ -17,8 +17,10 @@ from semgrid_eval.progress import Progress, Stage, silent, silent_stage
 from semgrid_eval.runs.matrix import Matrix, Row
 from semgrid_eval.runs.provenance import machine, versions
 from semgrid_eval.runs.sources import Sources
+from semgrid_eval.runs.thumbnails import keep_pictures
 from semgrid_eval.runs.unit import Worker, identity
 from semgrid_eval.scores import results
+from semgrid_eval.sequences.dataset import WindowSet
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,8 @@ class RunOptions:
         command: how the run was started, for the record.
         only: names of the rows to work on, all where it is empty; what the others have already is kept in the record.
         executor: where rows are trained and scored.
-        grid_executor: where grids are built.
+        grid_executor: where grids are built and pictures made small.
+        pictures: whether to keep small pictures of the windows' frames for the report.
     """
 
     device: str
@@ -40,6 +43,7 @@ class RunOptions:
     only: tuple[str, ...] = ()
     executor: Executor = field(default_factory=InProcess)
     grid_executor: Executor = field(default_factory=InProcess)
+    pictures: bool = True
 
 
 class Unit(NamedTuple):
@@ -88,6 +92,9 @@ def run_matrix(
         return record
 
     record = keep_record()
+    if options.pictures:
+        rows = [row for row in matrix.rows if not options.only or row.name in options.only]
+        keep_pictures(out, _scored_windows(worker, rows), options.grid_executor, stage)
     keys = [key for key in units if key in wanted]
     with _unit_work(matrix, logs, out, options, worker, stage) as (work, progress):
         progress(0, len(keys))
@@ -96,6 +103,13 @@ def run_matrix(
             record = keep_record()
             progress(done, len(keys))
     return record
+
+
+def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[WindowSet, str | None]]:
+    """Give the windows of rows that have some, and the camera that they show."""
+    for row in rows:
+        with suppress(SemgridError):  # its units will tell
+            yield worker.scored_windows(row)[0], row.grid.camera
 
 
 def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:

@@ -49,17 +49,25 @@ class Worker:
         Raises:
             SemgridError: the row cannot be run; the message says why.
         """
-        data = self.sources.data(row.grid, row.validation_split)
-        plan = validation_windows(data.frame_counts, row.scored_window)
-        scored = select_windows(data, plan.windows, sensors=row.sensors, translate=row.translate)
+        scored, left_out = self.scored_windows(row)
         windows_id = digest_value([scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
         training = self._training(row, seed, scored) if seed is not None else None
         counted = self._training_windows(row) if row.model == "table" else None
         config = _config(row)
         learned_from = training.id if training else counted.digest() if counted is not None else None
         result_id = digest_value([results.FORMAT_VERSION, config, windows_id, learned_from])
-        left_out = {self.sources.log_of[data.recordings[index]]: why for index, why in plan.too_short.items()}
         return Job(result_id, config, scored, windows_id, training, counted, left_out)
+
+    def scored_windows(self, row: Row) -> tuple[WindowSet, dict[str, str]]:
+        """Select the windows on which a row is scored, and say why some logs give none.
+
+        Raises:
+            SemgridError: there is no such window.
+        """
+        data = self.sources.data(row.grid, row.validation_split)
+        plan = validation_windows(data.frame_counts, row.scored_window)
+        left_out = {self.sources.log_of[data.recordings[index]]: why for index, why in plan.too_short.items()}
+        return select_windows(data, plan.windows, sensors=row.sensors, translate=row.translate), left_out
 
     def run(self, row: Row, seed: int | None) -> "Job":
         """Make sure that the result of a row with one seed lies in the run's folder, and return what was resolved.

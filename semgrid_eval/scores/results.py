@@ -12,6 +12,7 @@ RUN/results/<id>/predictions.npz   prediction (N, H, W) uint8 class ids, certain
 RUN/windows/<id>.npz           inputs (N, S, T, H, W) uint8 aligned, target (N, H, W) uint8, mask (N, H, W) bool;
                                where a log has the truth actors (N, H, W) uint8: 1 near a standing actor, 2 near a
                                moving one, 3 near both, zeros for windows of logs without the truth
+RUN/pictures/<key>.npz         small camera and label images of the windows' frames, see `scores.pictures`
 ```
 """
 

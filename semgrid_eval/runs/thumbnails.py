@@ -1,0 +1,154 @@
+"""Keeps small pictures of the frames that a run's windows use; what a log cannot give is left out."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import cv2
+import numpy as np
+
+from semgrid_eval.classes import label_palette
+from semgrid_eval.errors import InputError, ResultError, SemgridError
+from semgrid_eval.executors import Executor
+from semgrid_eval.frames.png import decode_colour, decode_ids, encode_gray, with_palette
+from semgrid_eval.grids.geometry import nearest_indices
+from semgrid_eval.log import topics
+from semgrid_eval.log.container import damage_as_log_error
+from semgrid_eval.log.moments import read_picture
+from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.progress import Stage
+from semgrid_eval.scores.pictures import FramePictures, pictures_file, read_pictures, write_pictures
+
+if TYPE_CHECKING:  # processes that only shrink pictures need no torch
+    from semgrid_eval.sequences.dataset import WindowSet
+
+WIDTH_PX = 256
+WEBP_QUALITY = 75
+
+
+class Request(NamedTuple):
+    """The frames of one camera of one log whose pictures are to lie in `file`."""
+
+    log: Path
+    digest: str
+    camera: str | None
+    stamps_ns: frozenset[int]
+    file: Path
+
+
+def keep_pictures(
+    run: Path, windows: Iterable[tuple["WindowSet", str | None]], executor: Executor, stage: Stage
+) -> None:
+    """Make sure that the pictures of all frames of windows lie in the run's folder, as far as the logs have them.
+
+    Logs that are gone, damaged or not what they were give none: a run needs no pictures.
+
+    Args:
+        run: folder of the run.
+        windows: sets of windows, each with the camera of its grids.
+        executor: works on several logs at once.
+        stage: shows progress.
+
+    Raises:
+        InputError: the folder cannot be written to.
+    """
+    missing = [request for request in _requests(run, windows) if not request.stamps_ns <= _kept(request.file).keys()]
+    if not missing:
+        return
+    with stage("pictures") as progress:
+        for done, (index, failure) in enumerate(executor.run(_keep, missing), start=1):
+            if isinstance(failure, InputError):
+                raise failure
+            progress(done, len(missing), missing[index].log.stem)
+
+
+def log_pictures(log: Path, digest: str, camera: str | None, stamps_ns: Iterable[int]) -> dict[int, FramePictures]:
+    """Make the small pictures of some frames of a log; frames, images and labels that it does not have stay empty.
+
+    Raises:
+        LogError: the log cannot be read, is damaged, or has another digest.
+    """
+    wanted = set(stamps_ns)
+    found: dict[int, dict[str, bytes]] = {stamp: {} for stamp in wanted}
+    with LogReader(log) as reader:
+        if reader.digest != digest or not wanted:
+            return {}
+        name = camera or reader.scene.cameras[0]
+        channels = {camera_topic(name, topics.IMAGE): "image", camera_topic(name, topics.LABEL): "label"}
+        for topic, stamp_ns, data in reader.messages(channels):
+            if stamp_ns > max(wanted):
+                break
+            if stamp_ns in wanted:
+                with damage_as_log_error(log):
+                    found[stamp_ns][channels[topic]] = read_picture(data)
+    return {stamp: _shrunk(files) for stamp, files in found.items()}
+
+
+def small_image(png: bytes) -> bytes:
+    """Turn a colour image, a PNG file, into a small WebP file; empty where it cannot be decoded."""
+    try:
+        image = decode_colour(png)
+    except InputError:
+        return b""
+    small = cv2.resize(image, _small_size(*image.shape[:2])[::-1], interpolation=cv2.INTER_AREA)
+    _, data = cv2.imencode(".webp", small[..., ::-1], [cv2.IMWRITE_WEBP_QUALITY, WEBP_QUALITY])
+    return bytes(data)
+
+
+def small_label(png: bytes) -> bytes:
+    """Turn a label image, a PNG file of label ids, into a small one with their colours; empty as `small_image`."""
+    try:
+        ids = decode_ids(png)
+    except InputError:
+        return b""
+    height, width = _small_size(*ids.shape)
+    small = ids[nearest_indices(ids.shape[0], height)[:, None], nearest_indices(ids.shape[1], width)[None, :]]
+    return with_palette(encode_gray(small), label_palette()[: int(small.max()) + 1])
+
+
+def _small_size(height: int, width: int) -> tuple[int, int]:
+    """Height and width of a picture that is no wider than `WIDTH_PX`."""
+    return (height, width) if width <= WIDTH_PX else (max(1, round(WIDTH_PX * height / width)), WIDTH_PX)
+
+
+def _shrunk(files: Mapping[str, bytes]) -> FramePictures:
+    shrink = {"image": small_image, "label": small_label}
+    return FramePictures(**{name: shrink[name](png) for name, png in files.items()})
+
+
+def _requests(run: Path, windows: Iterable[tuple["WindowSet", str | None]]) -> list[Request]:
+    """Gather the frames of all windows by log and camera; rows share most of them."""
+    logs: dict[Path, Request] = {}
+    for chosen, camera in windows:
+        data = chosen.data
+        frames = np.unique(np.append(chosen.inputs.cpu().numpy(), chosen.target_frames.cpu().numpy()))
+        owners = np.searchsorted(data.first_frames, frames, side="right") - 1
+        for owner in np.unique(owners).tolist():
+            stamps_ns = frozenset(data.stamps_ns[frames[owners == owner]].tolist())
+            file = pictures_file(run, data.digests[owner], camera)
+            known = logs[file].stamps_ns if file in logs else frozenset()
+            logs[file] = Request(Path(data.logs[owner]), data.digests[owner], camera, known | stamps_ns, file)
+    return list(logs.values())
+
+
+def _keep(request: Request) -> InputError | None:
+    """Add what is missing to a log's pictures, or return why that cannot be written."""
+    kept = _kept(request.file)
+    try:
+        made = log_pictures(request.log, request.digest, request.camera, request.stamps_ns - kept.keys())
+    except SemgridError:
+        return None
+    try:
+        if made:
+            write_pictures(request.file, kept | made)
+    except InputError as error:
+        return error
+    return None
+
+
+def _kept(file: Path) -> dict[int, FramePictures]:
+    try:
+        return read_pictures(file)
+    except ResultError:  # not made yet, or damaged
+        return {}

@@ -1,0 +1,172 @@
+import dataclasses
+import io
+import shutil
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+from support.toy_world import FRAME_NS, png, street
+
+from semgrid_eval.classes import LABEL_ID, label_palette
+from semgrid_eval.executors import InProcess, Processes
+from semgrid_eval.frames.png import decode_ids
+from semgrid_eval.log.store import LogReader, write_log
+from semgrid_eval.runs.matrix import load_matrix
+from semgrid_eval.runs.runner import RunOptions, run_matrix
+from semgrid_eval.runs.thumbnails import log_pictures, small_image, small_label
+from semgrid_eval.scores import results
+from semgrid_eval.scores.pictures import FramePictures, pictures_file, read_pictures
+
+START_NS = 10**18
+SHORT = {"name": "BL-DC", "model": "newest", "window": {"step_frames": 3, "target_frame": 8}}
+LONG = {"name": "BL-late", "model": "newest", "window": {"step_frames": 2, "target_frame": 8, "horizon_steps": 2}}
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pictured") / "logs"
+    for i in range(2):
+        write_log(street(i, frames=9).recording(f"toy{i}"), folder / "val" / f"toy{i}.mcap")
+    return folder
+
+
+def run(logs, out, *rows, executor=None, **options):
+    file = out.parent / f"{out.name}.yaml"
+    file.write_text(yaml.safe_dump({"rows": list(rows)}))
+    options = RunOptions("cpu", out.parent / "grids", "test", grid_executor=executor or InProcess(), **options)
+    return run_matrix(load_matrix(str(file)), logs, out, options)
+
+
+def digest(log):
+    with LogReader(log) as reader:
+        return reader.digest
+
+
+def kept_frames(out, log):
+    """Indices of the frames of a log whose pictures a run keeps."""
+    pictures = read_pictures(pictures_file(out, digest(log), None))
+    return [(stamp - START_NS) // FRAME_NS for stamp in sorted(pictures)]
+
+
+def files(folder):
+    return {path.name: (path.read_bytes(), path.stat().st_mtime_ns) for path in (folder / "pictures").iterdir()}
+
+
+def test_pictures_of_the_frames_in_windows_are_kept_and_no_others(logs, tmp_path):
+    run(logs, tmp_path / "run", SHORT, LONG)
+    for log in logs.rglob("*.mcap"):
+        assert kept_frames(tmp_path / "run", log) == [2, 4, 5, 8]  # inputs 2, 5 and 2, 4 and the target 8
+
+
+def test_pictures_show_what_the_camera_saw(logs, tmp_path):
+    run(logs, tmp_path / "run", SHORT)
+    log = logs / "val" / "toy1.mcap"
+    with LogReader(log) as reader:
+        frames = {frame.stamp_ns: frame for frame in reader.frames("front", images=True)}
+    for stamp_ns, kept in read_pictures(pictures_file(tmp_path / "run", digest(log), None)).items():
+        frame = frames[stamp_ns]
+        assert np.array_equal(decode_ids(kept.label), decode_ids(frame.label_png))
+        shown = np.asarray(Image.open(io.BytesIO(kept.image)).convert("RGB"), int)
+        source = np.asarray(Image.open(io.BytesIO(frame.image_png)).convert("RGB"), int)
+        assert shown.shape == source.shape
+        assert np.abs(shown - source).mean() < 6
+
+
+def test_large_pictures_become_small_and_keep_their_shape_and_side():
+    image = np.zeros((400, 1000, 3), np.uint8)
+    image[:100, :500] = (30, 60, 250)  # BGR: red, top left
+    small = np.asarray(Image.open(io.BytesIO(small_image(png(image)))).convert("RGB"), int)
+    assert small.shape == (102, 256, 3)
+    assert np.abs(small[:24, :126] - (250, 60, 30)).max() < 30
+    assert small[28:].max() < 30
+    assert small[:, 132:].max() < 30
+
+
+def test_labels_are_sampled_not_mixed_and_have_their_colours():
+    ids = np.full((300, 600), LABEL_ID["road"], np.uint8)
+    ids[:150, 200:] = LABEL_ID["bicycle"]
+    picture = Image.open(io.BytesIO(small_label(png(ids))))
+    assert picture.size == (256, 128)
+    small = np.asarray(picture)
+    assert set(np.unique(small)) == {LABEL_ID["road"], LABEL_ID["bicycle"]}
+    assert (small[:64, 86:] == LABEL_ID["bicycle"]).all()
+    colours = np.asarray(picture.convert("RGB"))
+    assert np.array_equal(colours, label_palette()[small])
+
+
+@pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff\xe0 a photo", png(np.zeros((9, 9, 3), np.uint8))[:60]])
+def test_what_cannot_be_decoded_gives_no_picture(data):
+    assert small_image(data) == small_label(data) == b""
+
+
+def test_a_second_start_makes_nothing_and_a_later_row_adds_its_frames(logs, tmp_path):
+    run(logs, tmp_path / "run", SHORT)
+    before = files(tmp_path / "run")
+    run(logs, tmp_path / "run", SHORT)
+    assert files(tmp_path / "run") == before
+    run(logs, tmp_path / "run", SHORT, LONG)
+    run(logs, tmp_path / "both", SHORT, LONG)
+    assert {name: data for name, (data, _) in files(tmp_path / "run").items()} == {
+        name: data for name, (data, _) in files(tmp_path / "both").items()
+    }
+
+
+def test_several_processes_give_the_same_bytes_and_lost_files_come_back(logs, tmp_path):
+    run(logs, tmp_path / "run", SHORT)
+    before = {name: data for name, (data, _) in files(tmp_path / "run").items()}
+    first, second = sorted((tmp_path / "run" / "pictures").iterdir())
+    first.unlink()
+    second.write_bytes(b"junk")
+    run(logs, tmp_path / "run", SHORT, executor=Processes(2))
+    assert {name: data for name, (data, _) in files(tmp_path / "run").items()} == before
+
+
+def test_pictures_change_no_result_and_can_be_left_out(logs, tmp_path):
+    with_pictures = run(logs, tmp_path / "with", SHORT)
+    without = run(logs, tmp_path / "without", SHORT, pictures=False)
+    assert with_pictures.rows == without.rows
+    assert not (tmp_path / "without" / "pictures").exists()
+
+
+def without_images(recording):
+    """Take the camera's colour images out of a recording."""
+
+    def moments():
+        for moment in recording.moments():
+            cameras = {name: dataclasses.replace(frame, image_png=None) for name, frame in moment.cameras.items()}
+            yield dataclasses.replace(moment, cameras=cameras)
+
+    return dataclasses.replace(recording, moments=moments)
+
+
+def test_a_log_without_images_gives_labels_alone(tmp_path):
+    write_log(without_images(street(1, frames=9).recording("dark")), tmp_path / "logs" / "dark.mcap")
+    record = run(tmp_path / "logs", tmp_path / "run", SHORT)
+    assert record.rows[0].failure is None
+    pictures = read_pictures(pictures_file(tmp_path / "run", digest(tmp_path / "logs" / "dark.mcap"), None))
+    assert [(bool(each.image), bool(each.label)) for each in pictures.values()] == [(False, True)] * 3
+    before = files(tmp_path / "run")
+    run(tmp_path / "logs", tmp_path / "run", SHORT)
+    assert files(tmp_path / "run") == before
+
+
+def test_frames_that_a_log_does_not_have_stay_empty_and_another_log_gives_none(logs):
+    log = logs / "val" / "toy0.mcap"
+    assert log_pictures(log, digest(log), "front", [7]) == {7: FramePictures()}
+    assert log_pictures(log, digest(log), "rear", [START_NS]) == {START_NS: FramePictures()}
+    assert log_pictures(log, "another", None, [START_NS]) == {}
+
+
+def test_a_log_that_is_damaged_after_its_grids_were_built_costs_no_result(logs, tmp_path):
+    copy = tmp_path / "logs"
+    shutil.copytree(logs, copy)
+    run(copy, tmp_path / "first", SHORT, pictures=False)
+    log = copy / "val" / "toy0.mcap"
+    data = bytearray(log.read_bytes())
+    data[len(data) // 2] ^= 255  # in a chunk; the index, and so the digest, is as before
+    log.write_bytes(data)
+    record = run(copy, tmp_path / "second", SHORT)
+    assert record.rows[0].failure is None
+    assert len(results.read_result(results.result_folder(tmp_path / "second", record.rows[0].results[0])).windows) == 2
+    assert len(files(tmp_path / "second")) == 1
