@@ -45,6 +45,19 @@ CLASS_COUNT = len(CLASSES)
 UNKNOWN = CLASS_NAMES.index("unknown")
 CATEGORY_NAMES = tuple(category.name.lower() for category in Category)
 MASK_COLOUR = (255, 255, 255)
+SAFE_COLOURS = (
+    (0, 0, 0),
+    (28, 51, 83),
+    (133, 104, 157),
+    (175, 153, 162),
+    (50, 102, 26),
+    (255, 213, 0),
+    (41, 136, 255),
+    (178, 206, 255),
+    (253, 116, 17),
+    (124, 0, 175),
+)
+"""sRGB by class id, far apart for readers with any kind of colour blindness; the paper's reds and greens are not."""
 
 
 @dataclass(frozen=True)
@@ -127,9 +140,9 @@ def label_palette() -> NDArray[np.uint8]:
     return palette
 
 
-def class_palette() -> NDArray[np.uint8]:
-    """Return the sRGB palette (C, 3) of grid classes."""
-    return np.array([entry.colour for entry in CLASSES], np.uint8)
+def class_palette(*, safe: bool = False) -> NDArray[np.uint8]:
+    """Return the sRGB palette (C, 3) of grid classes: the paper's colours, or those that are colour-blind-safe."""
+    return np.array(SAFE_COLOURS if safe else [entry.colour for entry in CLASSES], np.uint8)
 
 
 def category_members() -> dict[str, tuple[int, ...]]:

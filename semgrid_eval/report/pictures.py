@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_eval.classes import CLASS_COUNT, CLASSES, MASK_COLOUR, class_palette
+from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, class_palette
+from semgrid_eval.report.colours import class_colours, hex_colour
 
 Grid = NDArray[np.uint8]
 
@@ -16,20 +17,15 @@ RIGHT_COLOURS = ((0, 0, 0), (128, 132, 138), (0, 114, 178), (230, 159, 0), (90, 
 RIGHT_LABELS = ("unknown in all", "both right", "only the model right", "only the baseline right", "both wrong", "M")
 _CERTAINTY_LEVELS = 16
 
-
-def _hex(colour: tuple[int, int, int]) -> str:
-    return "#{:02x}{:02x}{:02x}".format(*colour)
-
-
-CLASS_LEGEND = tuple((entry.name.replace("_", " "), _hex(entry.colour)) for entry in CLASSES)
-MASK_LEGEND = ("M (left out)", _hex(MASK_COLOUR))
-RIGHT_LEGEND = tuple((name, _hex(colour)) for name, colour in zip(RIGHT_LABELS, RIGHT_COLOURS, strict=True))
+CLASS_LEGEND = class_colours()
+MASK_LEGEND = ("M (left out)", hex_colour(MASK_COLOUR))
+RIGHT_LEGEND = tuple((name, hex_colour(colour)) for name, colour in zip(RIGHT_LABELS, RIGHT_COLOURS, strict=True))
 
 
 def grid_png(grid: Grid, mask: NDArray[np.bool_] | None = None) -> bytes:
-    """Draw a grid in the classes' colours, mask M in white: (H, W)."""
+    """Draw a grid in the colour-blind-safe class colours, which a page's reader may switch, M in white: (H, W)."""
     shown = grid if mask is None else np.where(mask, MASKED, grid).astype(np.uint8)
-    return _png(shown, np.vstack([class_palette(), np.array([MASK_COLOUR], np.uint8)]))
+    return _png(shown, np.vstack([class_palette(safe=True), np.array([MASK_COLOUR], np.uint8)]))
 
 
 def certainty_png(certainty: Grid) -> bytes:
