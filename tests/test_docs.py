@@ -31,7 +31,7 @@ def commands():
 def workplace(tmp_path, monkeypatch):
     """Everything that README's commands take as given."""
     monkeypatch.chdir(tmp_path)
-    for folder in ("SRC", "PREDICTIONS", "logs/val", "runs/first"):
+    for folder in ("SRC", "PREDICTIONS", "logs/val", "recordings", "runs/first"):
         Path(folder).mkdir(parents=True)
     for file in ("logs/val/a.mcap", "network.onnx"):
         Path(file).touch()

@@ -18,6 +18,16 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
 @click.option("--logs", required=True, type=click.Path(path_type=Path, exists=True), help="Folder of MCAP logs.")
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the run.")
 @click.option("--grids", type=click.Path(path_type=Path, file_okay=False), help="Grid cache (default: OUT/grids).")
+@click.option(
+    "--validation-logs",
+    type=click.Path(path_type=Path, exists=True),
+    help="Folder of the logs to score, where they are not in --logs.",
+)
+@click.option(
+    "--trainings",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Trained networks (default: OUT/trainings); those of another run are used where they fit.",
+)
 @click.option("--row", "only", multiple=True, help="Only this row; may be given several times.")
 @click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Rows trained at once.")
@@ -42,6 +52,8 @@ def command(
     logs: Path,
     out: Path,
     grids: Path | None,
+    validation_logs: Path | None,
+    trainings: Path | None,
     only: tuple[str, ...],
     device: str,
     jobs: int,
@@ -69,7 +81,15 @@ def command(
     resolved = load_matrix(matrix)
     rows_on: Executor = local_executor(jobs) if executor == "local" else _ray(address, jobs, gpus)
     options = RunOptions(
-        device, grids or out / "grids", command_line(), only, rows_on, local_executor(workers), pictures
+        device,
+        grids or out / "grids",
+        command_line(),
+        only,
+        rows_on,
+        local_executor(workers),
+        pictures,
+        validation_logs,
+        trainings,
     )
     if dry_run:
         return _show_plan(resolved, logs, out, options)

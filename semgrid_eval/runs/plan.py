@@ -50,7 +50,8 @@ def plan_run(
         InputError: there is no log at all, or the device does not exist.
     """
     worker = make_worker(matrix, logs, out, options, stage)
-    worker.sources.prepare()
+    for sources in worker.sources:
+        sources.prepare()
     wanted = wanted_keys(matrix, options.only)
     units = {key: unit for key, unit in plan_units(matrix).items() if key in wanted}
     sharing: dict[str, list[str]] = {key: [] for key in units}
@@ -99,7 +100,7 @@ class _Speed:
         if shape not in self._seconds_by_shape:
             self._seconds_by_shape[shape] = self._measure(row, training)
         of_update = self._seconds_by_shape[shape]
-        validated = row.training.epochs * len(training.watched)
+        validated = row.training.epochs * len(training.watched or ())
         updates = row.training.updates_until(row.training.epochs)
         return of_update * (updates + SCORING_SHARE * validated / row.training.batch)
 

@@ -25,7 +25,7 @@ from semgrid_eval.sequences.dataset import WindowSet
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What does not change the numbers of a run on one machine.
+    """How a matrix is run; but for the logs to score, nothing here changes its numbers on one machine.
 
     Args:
         device: `auto`, `cpu`, `cuda`, `cuda:1`, ...
@@ -34,6 +34,8 @@ class RunOptions:
         only: names of the rows to work on, all where it is empty; what the others have already is kept in the record.
         executor: where rows are trained and scored.
         grid_executor: where grids are built and pictures made small.
+        validation_logs: folder of the logs to score, where they are not among those to train on.
+        trainings: folder of the trainings, the run's own if not given; what another run has trained is found there.
         pictures: whether to keep small pictures of the windows' frames for the report.
     """
 
@@ -44,6 +46,8 @@ class RunOptions:
     executor: Executor = field(default_factory=InProcess)
     grid_executor: Executor = field(default_factory=InProcess)
     pictures: bool = True
+    validation_logs: Path | None = None
+    trainings: Path | None = None
 
 
 class Unit(NamedTuple):
@@ -81,7 +85,8 @@ def run_matrix(
     """
     started = _Clock()
     worker = make_worker(matrix, logs, out, options, stage)
-    worker.sources.prepare()
+    for sources in worker.sources:
+        sources.prepare()
     units = plan_units(matrix)
     wanted = wanted_keys(matrix, options.only)
     outcomes = {key: found for key in units if key not in wanted and (found := _finished(worker, units[key]))}
@@ -120,8 +125,11 @@ def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stag
     """
     keep_freed_memory()
     device = choose_device(options.device)
-    sources = Sources(logs, options.grids, matrix.rows, executor=options.grid_executor, device=device, stage=stage)
-    return Worker(out, sources, device, matrix.seed, stage)
+    source = partial(
+        Sources, cache=options.grids, rows=matrix.rows, executor=options.grid_executor, device=device, stage=stage
+    )
+    scored = source(options.validation_logs) if options.validation_logs else None
+    return Worker(out, source(logs), device, matrix.seed, stage, scored_sources=scored, trainings=options.trainings)
 
 
 class _Clock:
@@ -145,7 +153,15 @@ def _unit_work(
         yield partial(_attempt, worker), silent  # the stages of a unit show themselves
         return
     # Elsewhere the same folder may be another one: paths must not depend on where a process stands.
-    place = _Place(matrix.model_dump_json(), logs.resolve(), out.resolve(), options.grids.resolve(), options.device)
+    place = _Place(
+        matrix.model_dump_json(),
+        options.device,
+        logs.resolve(),
+        out.resolve(),
+        options.grids.resolve(),
+        options.validation_logs and options.validation_logs.resolve(),
+        options.trainings and options.trainings.resolve(),
+    )
     with stage("rows") as progress:
         yield partial(_attempt_elsewhere, place), progress
 
@@ -154,10 +170,12 @@ class _Place(NamedTuple):
     """All that another process needs to work on a run; equal places share a worker."""
 
     matrix: str
+    device: str
     logs: Path
     out: Path
     grids: Path
-    device: str
+    validation_logs: Path | None
+    trainings: Path | None
 
 
 def _attempt_elsewhere(place: _Place, unit: Unit) -> Outcome:
@@ -167,7 +185,9 @@ def _attempt_elsewhere(place: _Place, unit: Unit) -> Outcome:
 @lru_cache(maxsize=1)
 def _worker_at(place: _Place) -> Worker:
     """Make the worker of a process that gets units of one run; it keeps the grids between them."""
-    options = RunOptions(place.device, place.grids, command="")
+    options = RunOptions(
+        place.device, place.grids, command="", validation_logs=place.validation_logs, trainings=place.trainings
+    )
     return make_worker(Matrix.model_validate_json(place.matrix), place.logs, place.out, options, silent_stage)
 
 
@@ -208,7 +228,8 @@ def units_of(row: Row, first_seed: int) -> Iterator[tuple[str, Unit]]:
 def _record(
     matrix: Matrix, command: str, started: _Clock, worker: Worker, outcomes: dict[str, Outcome]
 ) -> results.RunRecord:
-    sources = worker.sources
+    logs = [log for sources in worker.sources for log in sources.records.values()]
+    failed = {log: reason for sources in worker.sources for log, reason in sources.failed.items()}
     return results.RunRecord(
         format_version=results.FORMAT_VERSION,
         title=matrix.title,
@@ -218,8 +239,8 @@ def _record(
         machine=machine(worker.device),
         started=started.utc,
         seconds=started.seconds(),
-        logs=tuple(sources.records[key] for key in sorted(sources.records)),
-        failed_logs=sources.failed | _too_short(outcomes),
+        logs=tuple(sorted(logs, key=lambda log: log.path)),
+        failed_logs=failed | _too_short(outcomes),
         rows=tuple(_row_record(row, matrix.seed, outcomes) for row in matrix.rows),
     )
 

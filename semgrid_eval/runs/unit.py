@@ -9,7 +9,7 @@ import torch
 
 from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.errors import ResultError
+from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import atomic_folder, digest_files, digest_value
 from semgrid_eval.models.baselines import FuseAll, OverlaySensors, RepeatNewest
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
@@ -33,15 +33,33 @@ class Worker:
 
     Args:
         out: folder of the run.
-        sources: the grids.
+        sources: the grids to train on.
         device: where models run.
         example_seed: of the trained results whose predictions are kept for a report's examples.
         stage: shows progress.
+        scored_sources: the grids to score on, where they are others.
+        trainings: folder of the trainings, where it is not the run's own.
     """
 
-    def __init__(self, out: Path, sources: Sources, device: torch.device, example_seed: int, stage: Stage) -> None:
-        self._out, self.sources, self.device, self._stage = out, sources, device, stage
-        self._example_seed = example_seed
+    def __init__(
+        self,
+        out: Path,
+        sources: Sources,
+        device: torch.device,
+        example_seed: int,
+        stage: Stage,
+        *,
+        scored_sources: Sources | None = None,
+        trainings: Path | None = None,
+    ) -> None:
+        self._out, self.device, self._stage, self._example_seed = out, device, stage, example_seed
+        self._sources, self._scored_sources = sources, scored_sources or sources
+        self._trainings = trainings or out / "trainings"
+
+    @property
+    def sources(self) -> tuple[Sources, ...]:
+        """Where grids come from: one folder of logs, or one to train on and one to score on."""
+        return tuple(dict.fromkeys((self._sources, self._scored_sources)))
 
     def look(self, row: Row, seed: int | None) -> "Job":
         """Resolve a row with one seed into its windows, its training and the id of its result.
@@ -51,7 +69,7 @@ class Worker:
         """
         scored, left_out = self.scored_windows(row)
         windows_id = digest_value([scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
-        training = self._training(row, seed, scored) if seed is not None else None
+        training = self._training(row, seed, self._watched(row, scored)) if seed is not None else None
         counted = self._training_windows(row) if row.model == "table" else None
         config = _config(row)
         learned_from = training.id if training else counted.digest() if counted is not None else None
@@ -64,9 +82,9 @@ class Worker:
         Raises:
             SemgridError: there is no such window.
         """
-        data = self.sources.data(row.grid, row.validation_split)
+        data = self._scored_sources.data(row.grid, row.validation_split)
         plan = validation_windows(data.frame_counts, row.scored_window)
-        left_out = {self.sources.log_of[data.recordings[index]]: why for index, why in plan.too_short.items()}
+        left_out = {self._scored_sources.log_of[data.recordings[index]]: why for index, why in plan.too_short.items()}
         return select_windows(data, plan.windows, sensors=row.sensors, translate=row.translate), left_out
 
     def run(self, row: Row, seed: int | None) -> "Job":
@@ -91,7 +109,7 @@ class Worker:
             log_digests=tuple(sorted(set(job.scored.data.digests))),
             seed=seed,
             windows_id=job.windows_id,
-            windows=_window_records(job.scored, self.sources.log_of),
+            windows=_window_records(job.scored, self._scored_sources.log_of),
             device=str(self.device),
             train_seconds=round(trained.seconds, 3) if trained else None,
             predict_seconds=round(evaluation.seconds, 6),
@@ -111,11 +129,25 @@ class Worker:
         return seed in (None, self._example_seed)
 
     def _training_windows(self, row: Row) -> WindowSet:
-        data = self.sources.data(row.grid, row.train_split)
+        data = self._sources.data(row.grid, row.train_split)
         windows = training_windows(data.frame_counts, row.window).windows
         return select_windows(data, windows, sensors=row.sensors, translate=row.translate)
 
-    def _training(self, row: Row, seed: int, watched: WindowSet) -> "Training":
+    def _watched(self, row: Row, scored: WindowSet) -> WindowSet | None:
+        """Select the windows whose loss a training notes; they are the training logs' own, wherever it is scored.
+
+        So one training serves the scores on all sorts of logs.
+        """
+        if self._scored_sources is self._sources:
+            return scored
+        try:
+            data = self._sources.data(row.grid, row.validation_split)
+            windows = validation_windows(data.frame_counts, row.window).windows
+        except InputError:  # no such logs among them, and none is needed
+            return None
+        return select_windows(data, windows, sensors=row.sensors, translate=row.translate)
+
+    def _training(self, row: Row, seed: int, watched: WindowSet | None) -> "Training":
         windows = self._training_windows(row)
         training_id = digest_value(
             {
@@ -126,10 +158,10 @@ class Worker:
                 # Sums on a CPU are rounded by how many threads share them.
                 "threads": torch.get_num_threads() if self.device.type == "cpu" else None,
                 "seed": seed,
-                "windows": [windows.digest(), watched.digest(), grid_digest(row.grid)],
+                "windows": [windows.digest(), watched.digest() if watched else None, grid_digest(row.grid)],
             }
         )
-        return Training(training_id, self._out / "trainings" / training_id, seed, windows, watched)
+        return Training(training_id, self._trainings / training_id, seed, windows, watched)
 
     def _train(self, job: "Training", row: Row) -> Trained:
         with self._stage(f"train {row.name} (seed {job.seed})") as progress:
@@ -176,13 +208,13 @@ class Job:
 
 @dataclass(frozen=True)
 class Training:
-    """A training that a row asks for; rows that ask for the same one share its folder."""
+    """A training that a row asks for, with the windows whose loss it notes; rows that ask for the same one share it."""
 
     id: str
     folder: Path
     seed: int
     windows: WindowSet
-    watched: WindowSet
+    watched: WindowSet | None
 
 
 def identity(row: Row) -> dict[str, object]:

@@ -138,6 +138,17 @@ def test_paper_cpu_has_the_rows_of_paper_and_the_stronger_baselines():
     assert {row.training.updates_until(row.training.epochs) for row in scaled} == {3000}
 
 
+def test_real_trains_as_paper_cpu_and_scores_windows_that_fit_ten_frames():
+    scaled = {row.name: row for row in load_matrix("paper-cpu").rows}
+    rows = load_matrix("real").rows
+    assert {row.name for row in rows} == set(scaled) - {"BL-PH2", "ED-PH2", "BL-PH3", "ED-PH3", "ED-SL4", "ED-SL5"}
+    for row in rows:
+        assert row.model_copy(update={"validation_window": None}) == scaled[row.name]
+        assert row.scored_window.reach_frames <= 9
+        assert row.scored_window.step_frames == 3
+        assert row.scored_window.horizon_steps == row.window.horizon_steps
+
+
 def test_a_validation_window_is_as_the_window_where_it_says_nothing(tmp_path):
     row = {
         "name": "n{window.inputs}",

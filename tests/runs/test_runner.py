@@ -19,23 +19,23 @@ from semgrid_eval.scores import results
 from semgrid_eval.scores.iou import category_iou, class_iou
 
 WINDOW = {"step_frames": 3, "target_frame": 8}
+SPLITS = ("train", "train", "val", "val")
 TINY = {"network": {"features": 4, "depth": 2}, "training": {"epochs": 2, "updates_per_epoch": 3, "batch": 2}}
 
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("logs")
-    for i in range(4):
-        split = "train" if i < 2 else "val"
+    for i, split in enumerate(SPLITS):
         world = street(i, frames=9, speed_mps=8 + i, yaw_rate_radps=0.1 * (i - 1), noise_px=0.05)
         write_log(world.recording(f"toy_{i:06}_000000", split), folder / split / f"toy{i}.mcap")
     return folder
 
 
-def run(rows, logs, out, executor=None, only=(), **defaults):
+def run(rows, logs, out, executor=None, only=(), *, folders=None, **defaults):
     path = out.parent / f"{out.name}.yaml"
     path.write_text(yaml.safe_dump({"seed": 5, "defaults": {"window": WINDOW, **TINY, **defaults}, "rows": rows}))
-    options = RunOptions("cpu", out.parent / "grids", "test", only, executor or InProcess())
+    options = RunOptions("cpu", out.parent / "grids", "test", only, executor or InProcess(), **(folders or {}))
     return run_matrix(load_matrix(str(path)), logs, out, options)
 
 
@@ -256,6 +256,42 @@ def test_recordings_of_another_frame_rate_are_scored_in_windows_of_their_own(log
     assert record.rows[0].step_frames == 2
     result = results.read_result(results.result_folder(tmp_path / "run", record.rows[0].results[0]))
     assert [window.target_frame for window in result.windows] == [4, 5, 6, 7, 8] * 2
+
+
+@pytest.mark.parametrize("executor", [InProcess(), Processes(2, threads=torch.get_num_threads())])
+def test_logs_of_another_folder_are_scored_with_the_networks_that_another_run_trained(logs, tmp_path, executor):
+    write_log(street(5, frames=7).recording("real", "val"), tmp_path / "real" / "real.mcap")
+    rows = [{"name": "ED-DC", "model": "ed"}, {"name": "BL-Table", "model": "table"}, {"name": "BL", "model": "newest"}]
+    run(rows, logs, tmp_path / "town")
+    trained = {path: path.stat().st_mtime_ns for path in (tmp_path / "town" / "trainings").rglob("*")}
+    folders = {"validation_logs": tmp_path / "real", "trainings": tmp_path / "town" / "trainings"}
+    scored_windows = {"step_frames": 2, "target_frame": None}
+    real = tmp_path / "real_run"
+    record = run(rows, logs, real, executor, folders=folders, validation_window=scored_windows)
+    assert [row.failure for row in record.rows] == [None] * 3
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "town" / "trainings").rglob("*")} == trained
+    assert not (real / "trainings").exists()
+    assert [log.path for log in record.logs] == ["real.mcap", *(f"{s}/toy{i}.mcap" for i, s in enumerate(SPLITS))]
+    for row in record.rows:
+        result = results.read_result(results.result_folder(real, row.results[0]))
+        assert [(window.recording, window.target_frame) for window in result.windows] == [
+            ("real", 4),
+            ("real", 5),
+            ("real", 6),
+        ]
+        assert {window.log for window in result.windows} == {"real.mcap"}
+    again = run(
+        rows, logs, tmp_path / "alone", folders={"validation_logs": tmp_path / "real"}, validation_window=scored_windows
+    )
+    assert [row.results for row in again.rows] == [row.results for row in record.rows]
+
+
+def test_logs_to_train_on_need_none_to_validate(logs, tmp_path):
+    folders = {"validation_logs": logs / "val"}
+    record = run([{"name": "ED-DC", "model": "ed"}], logs / "train", tmp_path / "run", folders=folders)
+    assert record.rows[0].failure is None
+    history = results.read_history(results.result_folder(tmp_path / "run", record.rows[0].results[0]))
+    assert history["validation_loss"].isna().all()
 
 
 def test_a_model_that_cheats_or_leaves_is_stopped(logs, tmp_path):
