@@ -1,5 +1,6 @@
 """Convert recordings to logs, several at once: what is done is skipped, what fails is named, the rest goes on."""
 
+import errno
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -10,6 +11,8 @@ from semgrid_eval.executors import Executor, WorkerDied
 from semgrid_eval.frames.types import Recording
 from semgrid_eval.log.store import SUFFIX, LogReader, write_log
 from semgrid_eval.progress import Progress
+
+_DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ def convert_recordings(
         progress: told after each recording.
 
     Raises:
-        InputError: two recordings have one name.
+        InputError: two recordings have one name, or the disk is full.
     """
     _refuse_duplicates(jobs)
     summary = ConversionSummary()
@@ -66,6 +69,9 @@ def convert_recordings(
         job = jobs[index]
         if isinstance(outcome, WorkerDied):
             summary.failed[job.label] = outcome.reason
+        elif outcome.disk_full:
+            whole = len(summary.written) + len(summary.skipped)
+            raise InputError(f"{outcome.failure}; {whole} of {len(jobs)} logs are whole and stay; make room and go on")
         elif outcome.failure is not None:
             summary.failed[job.label] = outcome.failure
         else:
@@ -81,6 +87,7 @@ def convert_recordings(
 class _Outcome:
     written: bool
     failure: str | None = None
+    disk_full: bool = False
 
 
 def _convert(job: ConversionJob, out: Path) -> _Outcome:
@@ -92,8 +99,13 @@ def _convert(job: ConversionJob, out: Path) -> _Outcome:
         write_log(job.load(), path)
     except SemgridError as error:
         stale = f" (the log of an earlier conversion stays: {path})" if path.exists() else ""
-        return _Outcome(written=False, failure=f"{error}{stale}")
+        return _Outcome(written=False, failure=f"{error}{stale}", disk_full=_is_disk_full(error))
     return _Outcome(written=True)
+
+
+def _is_disk_full(error: SemgridError) -> bool:
+    """Whether every further log would fail alike."""
+    return isinstance(error.__cause__, OSError) and error.__cause__.errno in _DISK_FULL
 
 
 def _is_current(path: Path, digest: str) -> bool:

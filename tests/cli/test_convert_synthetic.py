@@ -1,3 +1,5 @@
+import errno
+import os
 import shlex
 import shutil
 
@@ -8,6 +10,7 @@ from support.towns import SMALL, town_cache
 from semgrid_eval.cli import convert_synthetic
 from semgrid_eval.cli.convert_synthetic import synthetic
 from semgrid_eval.cli.main import cli, main
+from semgrid_eval.frames.synthetic import sumo
 from semgrid_eval.frames.synthetic.benchmark import BenchmarkSize, SplitSize, load_benchmark, versions
 from semgrid_eval.log.fingerprint import fingerprint
 from semgrid_eval.log.store import LogReader, find_logs
@@ -161,3 +164,28 @@ def test_an_impossible_wish_is_one_line(option, message, tmp_path, capsys):
     assert code == 1
     assert len(lines) == 1
     assert lines[0].startswith(message)
+
+
+def test_a_failure_of_sumo_is_one_line_with_its_own_message(tmp_path, monkeypatch, capsys):
+    tool = tmp_path / "sumo/bin/netgenerate"
+    tool.parent.mkdir(parents=True)
+    tool.write_text("#!/bin/sh\necho 'Error: the street is closed.' >&2\nexit 1\n")
+    tool.chmod(0o755)
+    monkeypatch.setattr(sumo, "sumo_home", lambda: tmp_path / "sumo")
+    code, lines = run(capsys, tmp_path / "logs", "--recordings", 2, "--workers", 1)
+    assert (code, lines) == (1, ["Error: SUMO's netgenerate failed with exit code 1: the street is closed."])
+    assert list((tmp_path / "logs/.towns").iterdir()) == []
+
+
+def test_a_disk_that_is_full_is_one_line_after_the_progress(define, tmp_path, monkeypatch, capsys):
+    def fill(descriptor):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    define()
+    monkeypatch.setattr(os, "fsync", fill)
+    code, lines = run(capsys, tmp_path, *benchmark_options(1))
+    assert code == 1
+    assert [line for line in lines if not line.startswith("simulate: ")] == [
+        f"Error: {tmp_path}/{LABELS[0]}.mcap: cannot be written: No space left on device; "
+        "0 of 2 logs are whole and stay; make room and go on"
+    ]

@@ -1,3 +1,4 @@
+import errno
 import os
 import signal
 from functools import partial
@@ -95,6 +96,20 @@ def test_interrupted_conversion_leaves_whole_logs_and_goes_on_from_there(tmp_pat
     summary = convert(jobs, tmp_path)
     assert summary.skipped == left
     assert sorted([*summary.written, *summary.skipped]) == [f"val/{name}" for name in "abcdef"]
+
+
+def test_a_full_disk_ends_the_conversion_in_one_line_and_what_is_written_stays(tmp_path, monkeypatch):
+    def fill_the_disk(descriptor):
+        if (tmp_path / "val/b.mcap").exists():
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", fill_the_disk)
+    with pytest.raises(InputError, match=r"c\.mcap: cannot be written: No space left on device; 2 of 4 logs are whole"):
+        convert([job(name) for name in "abcd"], tmp_path)
+    assert sorted(path.name for path in (tmp_path / "val").iterdir()) == ["a.mcap", "b.mcap"]
+    monkeypatch.undo()
+    summary = convert([job(name) for name in "abcd"], tmp_path)
+    assert (summary.skipped, summary.written) == (["val/a", "val/b"], ["val/c", "val/d"])
 
 
 def test_progress_names_every_recording_once(tmp_path):

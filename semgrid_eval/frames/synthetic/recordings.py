@@ -1,5 +1,6 @@
 """Plans the recordings of a synthetic data set: which towns, which windows, which split."""
 
+import importlib.util
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from semgrid_eval.config import Config
+from semgrid_eval.errors import MissingExtraError
 from semgrid_eval.frames.synthetic.drives import choose_drives
 from semgrid_eval.frames.synthetic.kinds import KINDS
 from semgrid_eval.frames.synthetic.rendering import RecordingPlan, render_recording
@@ -18,6 +20,8 @@ from semgrid_eval.progress import Progress
 __all__ = ["RecordingPlan", "Stereo", "SyntheticConfig", "plan_recordings", "render_recording"]
 
 Stereo = Literal["modelled", "matched", "exact"]
+_POSITIONS_PER_KM2_S = 25_000
+_MAX_POSITIONS = 10_000_000  # of everybody in a town at every step; they are held in memory, some 200 bytes each
 
 
 class SyntheticConfig(Config):
@@ -56,6 +60,16 @@ class SyntheticConfig(Config):
             raise ValueError("val_towns must leave a town for training, and val_share recordings for validation")
         return self
 
+    @model_validator(mode="after")
+    def _town_fits_in_memory(self) -> Self:
+        positions = _POSITIONS_PER_KM2_S * (self.town_size_m / 1000.0) ** 2 * self.duration_s
+        if positions > _MAX_POSITIONS:
+            longest_s = int(self.duration_s * _MAX_POSITIONS / positions)
+            raise ValueError(
+                f"a town of {self.town_size_m:g} m can be simulated for {longest_s} s at most; ask for more towns"
+            )
+        return self
+
 
 def plan_recordings(
     config: SyntheticConfig, cache_dir: Path, progress: Progress, *, workers: int = 1, dataset: str = "synthetic"
@@ -71,8 +85,10 @@ def plan_recordings(
 
     Raises:
         InputError: SUMO failed, the cache cannot be written to, or a town's traffic holds too few windows.
-        MissingExtraError: SUMO is not installed.
+        MissingExtraError: SUMO or Embree is not installed.
     """
+    if importlib.util.find_spec("embreex") is None:  # otherwise first noticed minutes later, when rendering begins
+        raise MissingExtraError("synthetic", "embreex")
     shares = [share for share in _shares(config) if share.recordings > 0]
     folders = _prepare_towns([share.town for share in shares], cache_dir, progress, workers)
     plans: list[RecordingPlan] = []

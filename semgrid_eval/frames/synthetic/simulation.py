@@ -54,7 +54,7 @@ def _read_trajectories(path: Path) -> Traffic:
         raise InputError(f"SUMO's trajectories cannot be read ({error}); SUMO 1.28 writes them", path=path) from error
     table = table.dropna()
     if table.empty:
-        raise InputError("the town is empty: nobody moved", path=path)
+        raise InputError("the town is empty: nobody moved in it; ask for a larger town or a longer time")
     steps, offsets = np.unique(table["timestep_time"].to_numpy(), return_index=True)
     actor = table["vehicle_id"].cat.codes.to_numpy().astype(np.int32)
     type_of_code = np.array([type_index(name) for name in table["vehicle_type"].cat.categories], np.uint8)

@@ -47,7 +47,9 @@ def _run(name: str, command: list[str], folder: Path) -> None:
         done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     except OSError as error:
         raise InputError(f"SUMO's {name} cannot be started: {error.strerror or error}") from error
-    if done.returncode != 0:
+    if done.returncode < 0:
+        raise InputError(f"SUMO's {name} was killed by signal {-done.returncode} (out of memory?)")
+    if done.returncode > 0:
         raise InputError(f"SUMO's {name} failed with exit code {done.returncode}: {_fault(done.stderr + done.stdout)}")
 
 

@@ -2,6 +2,7 @@
 
 import io
 import math
+import sys
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,7 +13,7 @@ from support.towns import SMALL, small_plans, town_cache
 
 from semgrid_eval.classes import CITYSCAPES_LABELS, LABEL_ID
 from semgrid_eval.config import parse_config
-from semgrid_eval.errors import ConfigError, InputError
+from semgrid_eval.errors import ConfigError, InputError, MissingExtraError
 from semgrid_eval.frames.synthetic.recordings import SyntheticConfig, plan_recordings, render_recording
 from semgrid_eval.frames.synthetic.scene import FIRST_PARKED_ID
 from semgrid_eval.frames.synthetic.town import TownSpec, prepare_town
@@ -209,12 +210,32 @@ def test_more_windows_than_the_traffic_holds_are_refused_with_what_to_do():
         ({"towns": 1}, "different towns"),
         ({"town_size_m": 1e9}, "town_size_m"),
         ({"val_share": 1.0}, "val_share"),
+        ({"town_size_m": 2000.0, "duration_s": 3600.0}, r"a town of 2000 m can be simulated for 100 s at most"),
+        ({"val_towns": 2}, "val_towns must leave a town for training"),
+        ({"val_towns": 1, "val_share": 0.0}, "val_towns must leave .* and val_share recordings"),
         ({"colour": True}, "unknown key"),
     ],
 )
 def test_absurd_wishes_are_refused_by_name(changes, message):
     with pytest.raises(ConfigError, match=message):
         parse_config(SyntheticConfig, {**SMALL, **changes})
+
+
+def test_validation_may_have_another_share_of_the_towns_than_of_the_recordings():
+    config = SyntheticConfig(**{**SMALL, "towns": 3, "recordings": 8}, val_towns=1)
+    plans = plan_recordings(config, town_cache(), silent)
+    towns = {split: {plan.town for plan in plans if plan.split == split} for split in ("train", "val")}
+    assert (len(towns["train"]), len(towns["val"])) == (2, 1)
+    assert [plan.split for plan in plans] == ["train"] * 6 + ["val"] * 2
+
+
+def test_without_embree_the_extra_is_named_before_towns_are_simulated(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "embreex", None)
+    with pytest.raises(
+        MissingExtraError, match=r"embreex is not installed; .*semgrid-eval\[synthetic\]"
+    ):
+        plan_recordings(SyntheticConfig(**SMALL), tmp_path, silent)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_town_that_was_removed_is_named(plans, tmp_path):

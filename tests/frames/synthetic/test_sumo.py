@@ -34,3 +34,13 @@ def test_a_binary_that_cannot_start_is_named(monkeypatch, tmp_path):
     monkeypatch.setattr(sumo, "sumo_home", lambda: tmp_path)
     with pytest.raises(InputError, match="SUMO's netgenerate cannot be started: No such file"):
         sumo.run_binary("netgenerate", [], tmp_path)
+
+
+def test_a_binary_that_is_killed_says_so(monkeypatch, tmp_path):
+    (tmp_path / "bin").mkdir()
+    script = tmp_path / "bin/sumo"
+    script.write_text("#!/bin/sh\nkill -9 $$\n")
+    script.chmod(0o755)
+    monkeypatch.setattr(sumo, "sumo_home", lambda: tmp_path)
+    with pytest.raises(InputError, match=r"SUMO's sumo was killed by signal 9 \(out of memory\?\)"):
+        sumo.run_binary("sumo", [], tmp_path)
