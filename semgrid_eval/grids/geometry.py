@@ -67,6 +67,29 @@ def ground_rays(
     return GroundRays(origin_m, np.ascontiguousarray(slope), calibration.fx_px * calibration.baseline_m)
 
 
+def unit_projection(calibration: CameraCalibration, size_px: tuple[int, int]) -> Floats:
+    """Return the projection (3, 4) of points in the vehicle frame, (x, y, z, 1), to an image whose sides are 1 long.
+
+    It gives (w u, w v, w): u is 0 at the left edge and 1 at the right one, v at the upper and the lower one, w is the
+    depth in metres; what has w <= 0 lies behind the camera.
+
+    Args:
+        calibration: in pixels of the source image.
+        size_px: width and height of the source image.
+    """
+    width, height = size_px
+    camera_matrix = np.array(
+        [
+            [calibration.fx_px / width, 0.0, (calibration.u0_px + 0.5) / width],
+            [0.0, calibration.fy_px / height, (calibration.v0_px + 0.5) / height],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    optical_from_ego = (ego_from_camera(calibration) @ VEHICLE_AXES_FROM_OPTICAL_AXES).T
+    position_m = np.array([calibration.x_m, calibration.y_m, calibration.z_m])
+    return np.hstack([camera_matrix @ optical_from_ego, -(camera_matrix @ optical_from_ego @ position_m)[:, None]])
+
+
 def nearest_indices(source: int, target: int) -> NDArray[np.intp]:
     """Return, for each of `target` pixels, the nearest of `source` pixels along one axis (half-pixel centres)."""
     return ((np.arange(target) + 0.5) * source / target).astype(np.intp)

@@ -52,6 +52,11 @@ class Drive:
         self._poses = tuple(_poses(log, camera_topic(chosen, topics.DISPARITY)))
         self._frames = {pose.stamp_ns: frame for frame, pose in enumerate(self._poses)}
 
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """Where the vehicle is at each frame, in the odom frame."""
+        return self._poses
+
     def frame_at(self, stamp_ns: int) -> int:
         """Return the index of the frame of a time.
 

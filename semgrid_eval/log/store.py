@@ -126,6 +126,11 @@ class LogReader:
         """Digest of the content, from the log's own index and checksums (16 hexadecimal characters)."""
         return self._container.digest()
 
+    @property
+    def start_ns(self) -> int:
+        """When the log begins: the time of its first message, 0 where it has none."""
+        return min((index.message_start_time for index in self._container.summary.chunk_indexes), default=0)
+
     def verify(self) -> None:
         """Hold the checksum of everything in the file against its bytes.
 

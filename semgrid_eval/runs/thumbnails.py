@@ -1,4 +1,4 @@
-"""Keeps small pictures of the frames that a run's windows use; what a log cannot give is left out."""
+"""Keeps small pictures of the frames that a run's windows use, and the drive; what a log cannot give is left out."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -8,17 +8,25 @@ import cv2
 import numpy as np
 
 from semgrid_eval.classes import label_palette
-from semgrid_eval.errors import InputError, ResultError, SemgridError
+from semgrid_eval.errors import InputError, LogError, ResultError, SemgridError
 from semgrid_eval.executors import Executor
-from semgrid_eval.frames.png import decode_colour, decode_ids, encode_gray, with_palette
-from semgrid_eval.grids.geometry import nearest_indices
+from semgrid_eval.frames.png import decode_colour, decode_ids, encode_gray, read_header, with_palette
+from semgrid_eval.grids.geometry import nearest_indices, unit_projection
 from semgrid_eval.log import topics
 from semgrid_eval.log.container import damage_as_log_error
+from semgrid_eval.log.drive import Drive as LoggedDrive
 from semgrid_eval.log.moments import read_picture
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.progress import Stage
-from semgrid_eval.scores.pictures import FramePictures, pictures_file, read_pictures, write_pictures
+from semgrid_eval.scores.pictures import (
+    Drive,
+    FramePictures,
+    LogPictures,
+    pictures_file,
+    read_pictures,
+    write_pictures,
+)
 
 if TYPE_CHECKING:  # processes that only shrink pictures need no torch
     from semgrid_eval.sequences.dataset import WindowSet
@@ -63,8 +71,8 @@ def keep_pictures(
             progress(done, len(missing), missing[index].log.stem)
 
 
-def log_pictures(log: Path, digest: str, camera: str | None, stamps_ns: Iterable[int]) -> dict[int, FramePictures]:
-    """Make the small pictures of some frames of a log; frames, images and labels that it does not have stay empty.
+def log_pictures(log: Path, digest: str, camera: str | None, stamps_ns: Iterable[int]) -> LogPictures:
+    """Read the drive of a log and make small pictures of some of its frames; what it does not have stays empty.
 
     Raises:
         LogError: the log cannot be read, is damaged, or has another digest.
@@ -72,17 +80,18 @@ def log_pictures(log: Path, digest: str, camera: str | None, stamps_ns: Iterable
     wanted = set(stamps_ns)
     found: dict[int, dict[str, bytes]] = {stamp: {} for stamp in wanted}
     with LogReader(log) as reader:
-        if reader.digest != digest or not wanted:
-            return {}
+        if reader.digest != digest:
+            raise LogError(f"has digest {reader.digest}, not {digest}", path=log)
         name = camera or reader.scene.cameras[0]
+        drive = _drive(reader, name)
         channels = {camera_topic(name, topics.IMAGE): "image", camera_topic(name, topics.LABEL): "label"}
         for topic, stamp_ns, data in reader.messages(channels):
-            if stamp_ns > max(wanted):
+            if stamp_ns > max(wanted, default=-1):
                 break
             if stamp_ns in wanted:
                 with damage_as_log_error(log):
                     found[stamp_ns][channels[topic]] = read_picture(data)
-    return {stamp: _shrunk(files) for stamp, files in found.items()}
+    return LogPictures(drive, {stamp: _shrunk(files) for stamp, files in found.items()})
 
 
 def small_image(png: bytes) -> bytes:
@@ -110,6 +119,19 @@ def small_label(png: bytes) -> bytes:
 def _small_size(height: int, width: int) -> tuple[int, int]:
     """Height and width of a picture that is no wider than `WIDTH_PX`."""
     return (height, width) if width <= WIDTH_PX else (max(1, round(WIDTH_PX * height / width)), WIDTH_PX)
+
+
+def _drive(reader: LogReader, camera: str) -> Drive:
+    poses = LoggedDrive(reader, camera).poses
+    _, _, first = next(reader.messages([camera_topic(camera, topics.DISPARITY)]))
+    with damage_as_log_error(reader.path):
+        header = read_header(read_picture(first))
+    return Drive(
+        start_ns=reader.start_ns,
+        track_ns=np.array([pose.stamp_ns for pose in poses], np.int64),
+        track=np.array([(pose.x_m, pose.y_m, pose.yaw_rad) for pose in poses], np.float64),
+        projection=unit_projection(reader.calibration(camera), (header.width, header.height)),
+    )
 
 
 def _shrunk(files: Mapping[str, bytes]) -> FramePictures:
@@ -140,15 +162,14 @@ def _keep(request: Request) -> InputError | None:
     except SemgridError:
         return None
     try:
-        if made:
-            write_pictures(request.file, kept | made)
+        write_pictures(request.file, LogPictures(made.drive, {**kept, **made.frames}))
     except InputError as error:
         return error
     return None
 
 
-def _kept(file: Path) -> dict[int, FramePictures]:
+def _kept(file: Path) -> Mapping[int, FramePictures]:
     try:
-        return read_pictures(file)
+        return read_pictures(file).frames
     except ResultError:  # not made yet, or damaged
         return {}

@@ -1,12 +1,16 @@
-"""Small pictures of the frames that windows use, kept in a run so that a report can show them without the logs.
+"""What a run keeps of a log so that a report can show it: small pictures of the frames in windows, and the drive.
 
-`RUN/pictures/<key>.npz` holds those of one camera of one log, `<key>` being the digest of both: `stamps_ns` (K,) int64,
-ascending; the files of all images, then of all labels, one after the other as `images` and `labels` uint8, and where
-each ends as `image_ends` and `label_ends` (K,) int64. An empty file stands for a picture that the log does not have.
+`RUN/pictures/<key>.npz` holds that of one camera of one log, `<key>` being the digest of both:
+
+- `stamps_ns` (K,) int64, ascending; the files of all images, then of all labels, one after the other as `images` and
+  `labels` uint8, and where each ends as `image_ends` and `label_ends` (K,) int64. An empty file stands for a picture
+  that the log does not have.
+- `start_ns` (1,) int64, when the log begins; `track_ns` (F,) int64, times of all frames, `track` (F, 3) float64, poses
+  of the vehicle there, and `projection` (3, 4) float64, as `Drive` says.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any
@@ -19,7 +23,8 @@ from semgrid_eval.errors import ResultError
 from semgrid_eval.files import digest_value
 
 FORMAT_VERSION = 1
-_ARRAYS = ("stamps_ns", "images", "image_ends", "labels", "label_ends")
+_FILES = ("images", "image_ends", "labels", "label_ends")
+_DRIVE = ("start_ns", "track_ns", "track", "projection")
 
 
 @dataclass(frozen=True)
@@ -35,53 +40,99 @@ class FramePictures:
     label: bytes = b""
 
 
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Where vehicle and camera are.
+
+    Args:
+        start_ns: when the log begins.
+        track_ns: (F,) times of all frames.
+        track: (F, 3) x and y (m) and yaw (rad) of the vehicle there, in the log's odom frame.
+        projection: (3, 4) takes points in the vehicle frame (x, y, z, 1) to the image (w u, w v, w), u and v going
+            from 0 at its left and upper edge to 1 at its right and lower one, w being the depth in metres.
+    """
+
+    start_ns: int
+    track_ns: NDArray[np.int64]
+    track: NDArray[np.float64]
+    projection: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LogPictures:
+    """What is kept of a log: the drive, and pictures of frames by their stamps (ns)."""
+
+    drive: Drive
+    frames: Mapping[int, FramePictures] = field(default_factory=dict)
+
+
 def pictures_file(run: Path, log_digest: str, camera: str | None) -> Path:
     """Where the pictures of a camera of a log lie; None stands for a log's only camera."""
     key = {"log": log_digest, "camera": camera, "format": FORMAT_VERSION}
     return run / "pictures" / f"{digest_value(key)}.npz"
 
 
-def write_pictures(path: Path, pictures: Mapping[int, FramePictures]) -> None:
-    """Write the pictures of frames by their stamps (ns) atomically, equal ones giving equal bytes.
+def write_pictures(path: Path, kept: LogPictures) -> None:
+    """Write what is kept of a log atomically, equal things giving equal bytes.
 
     Raises:
         InputError: the folder cannot be written to.
     """
-    stamps_ns = sorted(pictures)
-    images, image_ends = _joined([pictures[stamp].image for stamp in stamps_ns])
-    labels, label_ends = _joined([pictures[stamp].label for stamp in stamps_ns])
-    stamps = np.array(stamps_ns, np.int64)
-    write_arrays(path, dict(zip(_ARRAYS, (stamps, images, image_ends, labels, label_ends), strict=True)))
+    stamps_ns = sorted(kept.frames)
+    images, image_ends = _joined([kept.frames[stamp].image for stamp in stamps_ns])
+    labels, label_ends = _joined([kept.frames[stamp].label for stamp in stamps_ns])
+    drive = kept.drive
+    arrays: dict[str, NDArray[Any]] = {
+        "stamps_ns": np.array(stamps_ns, np.int64),
+        **dict(zip(_FILES, (images, image_ends, labels, label_ends), strict=True)),
+        **dict(zip(_DRIVE, (np.array([drive.start_ns]), drive.track_ns, drive.track, drive.projection), strict=True)),
+    }
+    write_arrays(path, arrays)
 
 
-def read_pictures(path: Path) -> dict[int, FramePictures]:
-    """Read the pictures of frames by their stamps (ns).
+def read_pictures(path: Path) -> LogPictures:
+    """Read what is kept of a log.
 
     Raises:
-        ResultError: they are missing or malformed.
+        ResultError: it is missing or malformed.
     """
-    arrays = read_arrays(path, _ARRAYS)
-    stamps_ns = _whole_numbers(arrays["stamps_ns"], path, "stamps_ns")
-    images = _cut(arrays["images"], arrays["image_ends"], path, "images")
-    labels = _cut(arrays["labels"], arrays["label_ends"], path, "labels")
+    arrays = read_arrays(path, ("stamps_ns", *_FILES, *_DRIVE))
+    stamps_ns = _checked(arrays, "stamps_ns", (-1,), np.int64, path).tolist()
+    images = _cut(arrays, "images", "image_ends", path)
+    labels = _cut(arrays, "labels", "label_ends", path)
     if not len(stamps_ns) == len(images) == len(labels):
         raise ResultError(f"{len(stamps_ns)} frames have {len(images)} images and {len(labels)} labels", path=path)
-    return {stamp: FramePictures(*files) for stamp, *files in zip(stamps_ns, images, labels, strict=True)}
+    frames = {stamp: FramePictures(*files) for stamp, *files in zip(stamps_ns, images, labels, strict=True)}
+    return LogPictures(_drive(arrays, path), frames)
+
+
+def _drive(arrays: Mapping[str, NDArray[Any]], path: Path) -> Drive:
+    start_ns = int(_checked(arrays, "start_ns", (1,), np.int64, path)[0])
+    track_ns = _checked(arrays, "track_ns", (-1,), np.int64, path)
+    track = _checked(arrays, "track", (len(track_ns), 3), np.float64, path)
+    return Drive(start_ns, track_ns, track, _checked(arrays, "projection", (3, 4), np.float64, path))
 
 
 def _joined(files: Sequence[bytes]) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
     return np.frombuffer(b"".join(files), np.uint8), np.array(list(accumulate(map(len, files))), np.int64)
 
 
-def _cut(data: NDArray[Any], ends: NDArray[Any], path: Path, name: str) -> list[bytes]:
-    places = [0, *_whole_numbers(ends, path, name)]
-    if data.dtype != np.uint8 or data.ndim != 1 or places != sorted(places) or places[-1] != len(data):
+def _cut(arrays: Mapping[str, NDArray[Any]], name: str, ends_name: str, path: Path) -> list[bytes]:
+    data = _checked(arrays, name, (-1,), np.uint8, path)
+    places = [0, *_checked(arrays, ends_name, (-1,), np.int64, path).tolist()]
+    if places != sorted(places) or places[-1] != len(data):
         raise ResultError("is not one file after the other", path=path, field=name)
     return [data[start:end].tobytes() for start, end in pairwise(places)]
 
 
-def _whole_numbers(values: NDArray[Any], path: Path, name: str) -> list[int]:
-    if values.ndim != 1 or values.dtype != np.int64:
-        raise ResultError(f"has shape {values.shape}, type {values.dtype}", path=path, field=name)
-    numbers: list[int] = values.tolist()
-    return numbers
+def _checked(
+    arrays: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...], kind: type[np.generic], path: Path
+) -> NDArray[Any]:
+    """Give an array that has the shape, -1 standing for any length, and the type that it should, and is finite."""
+    values = arrays[name]
+    fits = len(values.shape) == len(shape) and all(
+        wanted in (-1, found) for wanted, found in zip(shape, values.shape, strict=True)
+    )
+    if not fits or values.dtype != kind or not np.isfinite(values).all():
+        raise ResultError(f"has shape {values.shape}, type {values.dtype}, or is not finite", path=path, field=name)
+    return values

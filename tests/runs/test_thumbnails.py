@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import yaml
 from PIL import Image
-from support.toy_world import FRAME_NS, png, street
+from support.toy_world import FRAME_NS, HEIGHT, WIDTH, png, street
 
 from semgrid_eval.classes import LABEL_ID, label_palette
+from semgrid_eval.errors import LogError
 from semgrid_eval.executors import InProcess, Processes
 from semgrid_eval.frames.png import decode_ids
 from semgrid_eval.log.store import LogReader, write_log
@@ -45,7 +46,7 @@ def digest(log):
 
 def kept_frames(out, log):
     """Indices of the frames of a log whose pictures a run keeps."""
-    pictures = read_pictures(pictures_file(out, digest(log), None))
+    pictures = read_pictures(pictures_file(out, digest(log), None)).frames
     return [(stamp - START_NS) // FRAME_NS for stamp in sorted(pictures)]
 
 
@@ -64,7 +65,7 @@ def test_pictures_show_what_the_camera_saw(logs, tmp_path):
     log = logs / "val" / "toy1.mcap"
     with LogReader(log) as reader:
         frames = {frame.stamp_ns: frame for frame in reader.frames("front", images=True)}
-    for stamp_ns, kept in read_pictures(pictures_file(tmp_path / "run", digest(log), None)).items():
+    for stamp_ns, kept in read_pictures(pictures_file(tmp_path / "run", digest(log), None)).frames.items():
         frame = frames[stamp_ns]
         assert np.array_equal(decode_ids(kept.label), decode_ids(frame.label_png))
         shown = np.asarray(Image.open(io.BytesIO(kept.image)).convert("RGB"), int)
@@ -144,7 +145,7 @@ def test_a_log_without_images_gives_labels_alone(tmp_path):
     write_log(without_images(street(1, frames=9).recording("dark")), tmp_path / "logs" / "dark.mcap")
     record = run(tmp_path / "logs", tmp_path / "run", SHORT)
     assert record.rows[0].failure is None
-    pictures = read_pictures(pictures_file(tmp_path / "run", digest(tmp_path / "logs" / "dark.mcap"), None))
+    pictures = read_pictures(pictures_file(tmp_path / "run", digest(tmp_path / "logs" / "dark.mcap"), None)).frames
     assert [(bool(each.image), bool(each.label)) for each in pictures.values()] == [(False, True)] * 3
     before = files(tmp_path / "run")
     run(tmp_path / "logs", tmp_path / "run", SHORT)
@@ -153,9 +154,28 @@ def test_a_log_without_images_gives_labels_alone(tmp_path):
 
 def test_frames_that_a_log_does_not_have_stay_empty_and_another_log_gives_none(logs):
     log = logs / "val" / "toy0.mcap"
-    assert log_pictures(log, digest(log), "front", [7]) == {7: FramePictures()}
-    assert log_pictures(log, digest(log), "rear", [START_NS]) == {START_NS: FramePictures()}
-    assert log_pictures(log, "another", None, [START_NS]) == {}
+    assert log_pictures(log, digest(log), "front", [7]).frames == {7: FramePictures()}
+    for known, camera, message in (("another", None, "has digest"), (digest(log), "rear", "rear is not one of: front")):
+        with pytest.raises(LogError, match=message):
+            log_pictures(log, known, camera, [START_NS])
+
+
+def test_the_drive_is_kept_with_the_camera_that_sees_it(logs, tmp_path):
+    run(logs, tmp_path / "run", SHORT)
+    log = logs / "val" / "toy0.mcap"
+    drive = read_pictures(pictures_file(tmp_path / "run", digest(log), None)).drive
+    assert drive.start_ns == drive.track_ns[0] == START_NS
+    assert (np.diff(drive.track_ns) == FRAME_NS).all()
+    assert np.allclose(drive.track[:, 0], 8.0 * FRAME_NS * 1e-9 * np.arange(9))  # the toy drives straight at 8 m/s
+    assert not drive.track[:, 1:].any()
+    world = street(0)
+    u, v = 40, 100  # a pixel that sees the road
+    label, depth_m = world.render((0.0, 0.0, 0.0))
+    assert label[v, u] == LABEL_ID["road"]
+    origin_m, ray = world._rays((0.0, 0.0, 0.0))
+    point_m = [origin_m[i] + depth_m[v, u] * ray[i][v, u] for i in range(3)]
+    x, y, w = drive.projection @ [*point_m, 1.0]
+    assert (x / w * WIDTH - 0.5, y / w * HEIGHT - 0.5, w) == pytest.approx((u, v, depth_m[v, u]))
 
 
 def test_a_log_that_is_damaged_after_its_grids_were_built_costs_no_result(logs, tmp_path):
