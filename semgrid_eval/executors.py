@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from multiprocessing.sharedctypes import Synchronized
 from typing import Protocol, TypeVar
 
 T = TypeVar("T")
@@ -21,9 +22,13 @@ _THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS
 
 @dataclass(frozen=True)
 class WorkerDied:
-    """Stands for the result of a piece of work whose process was killed."""
+    """Stands for the result of a piece of work whose process was killed, or that does not fit into memory."""
 
     reason: str = "a worker process was killed (out of memory?)"
+
+
+class NoRoomError(Exception):
+    """A piece of work does not fit into the memory of its device, perhaps because of others beside it."""
 
 
 class Executor(Protocol):
@@ -36,7 +41,8 @@ class Executor(Protocol):
     def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
         """Yield (index of the item, result) as results come; function, items and results must be picklable.
 
-        An exception of the function ends the iteration; what a user can cause must be part of the result.
+        An exception of the function other than `NoRoomError` ends the iteration; what a user can cause must be part
+        of the result.
         """
 
 
@@ -48,29 +54,47 @@ class InProcess:
     def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
         """Yield results in the order of the items."""
         for index, item in enumerate(items):
-            yield index, function(item)
+            try:
+                yield index, function(item)
+            except NoRoomError as error:
+                yield index, WorkerDied(str(error))
 
 
 class Processes:
-    """Works in several fresh processes of this machine, the cores shared out among them.
+    """Works in several fresh processes of this machine, its cores and GPUs shared out among them.
 
     Args:
         workers: how many processes.
         threads: of numeric libraries in each; by default the cores of the machine divided by `workers`.
+        gpus: as CUDA names them; each process sees one, and several share it where there are more processes.
     """
 
-    def __init__(self, workers: int, *, threads: int | None = None) -> None:
+    def __init__(self, workers: int, *, threads: int | None = None, gpus: Sequence[str] = ()) -> None:
         self.parallel = workers
         self._threads = threads or max(1, available_cores() // workers)
+        self._gpus = tuple(gpus)
 
     def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
         """Yield results as they come; stopping early drops what has not begun."""
+        # One process that is killed takes the work of all others with it, and what found no room may find it alone.
+        again = []
+        for index, result in self._together(function, items):
+            if isinstance(result, WorkerDied) and len(items) > 1:
+                again.append(index)
+            else:
+                yield index, result
+        for index in again:
+            for _, result in self._together(function, [items[index]]):
+                yield index, result
+
+    def _together(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
         # Fresh processes: a fork would copy whatever threads and locks the caller holds.
+        context = multiprocessing.get_context("spawn")
         pool = ProcessPoolExecutor(
             min(self.parallel, max(1, len(items))),
-            mp_context=multiprocessing.get_context("spawn"),
+            mp_context=context,
             initializer=_start_worker,
-            initargs=(self._threads,),
+            initargs=(self._threads, self._gpus, context.Value("i", 0)),
         )
         try:
             futures: dict[Future[R], int] = {pool.submit(function, item): i for i, item in enumerate(items)}
@@ -79,13 +103,15 @@ class Processes:
                     yield futures[future], future.result()
                 except BrokenProcessPool:
                     yield futures[future], WorkerDied()
+                except NoRoomError as error:
+                    yield futures[future], WorkerDied(str(error))
         finally:
             pool.shutdown(cancel_futures=True)
 
 
-def local_executor(workers: int) -> Executor:
-    """Choose between this process and several."""
-    return InProcess() if workers <= 1 else Processes(workers)
+def local_executor(workers: int, *, gpus: Sequence[str] = ()) -> Executor:
+    """Choose between this process and several, among which GPUs are shared out."""
+    return InProcess() if workers <= 1 else Processes(workers, gpus=gpus)
 
 
 def available_cores() -> int:
@@ -93,8 +119,12 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _start_worker(threads: int) -> None:
+def _start_worker(threads: int, gpus: tuple[str, ...], started: "Synchronized[int]") -> None:
     # Ctrl-C stops the parent alone: it drops what waits, and what is being written is finished.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in _THREAD_VARIABLES:
         os.environ[name] = str(threads)
+    with started.get_lock():
+        number, started.value = started.value, started.value + 1
+    if gpus:
+        os.environ["CUDA_VISIBLE_DEVICES"] = gpus[number % len(gpus)]

@@ -75,11 +75,13 @@ def command(
 
     --dry-run builds the grids, which a run then finds, times a few updates of each network, and prints the plan.
     """
+    from semgrid_eval.models.device import visible_gpus
     from semgrid_eval.runs.matrix import load_matrix
     from semgrid_eval.runs.runner import RunOptions, run_matrix
 
     resolved = load_matrix(matrix)
-    rows_on: Executor = local_executor(jobs) if executor == "local" else _ray(address, jobs, gpus)
+    shared = visible_gpus() if device in ("auto", "cuda") else ()
+    rows_on: Executor = local_executor(jobs, gpus=shared) if executor == "local" else _ray(address, jobs, gpus)
     options = RunOptions(
         device,
         grids or out / "grids",

@@ -1,6 +1,7 @@
 """Where models run: device, precision, memory of the process and seeds."""
 
 import ctypes
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -15,6 +16,7 @@ Precision = Literal["auto", "float32", "bf16"]
 
 _DEVICE_TYPES = ("cpu", "cuda", "mps")
 _CPU_FLAGS = Path("/proc/cpuinfo")
+_BF16_CAPABILITY = (8, 0)
 _BF16_FLAGS = {"avx512_bf16", "amx_bf16"}
 # Parameters of glibc's mallopt and values that make it keep and re-use its memory.
 _MALLOPT = {-4: 0, -1: 2**31 - 1, -2: 256 << 20}  # M_MMAP_MAX, M_TRIM_THRESHOLD, M_TOP_PAD
@@ -44,8 +46,18 @@ def choose_precision(name: Precision, device: torch.device) -> torch.dtype:
     On two cores of an AMD EPYC with avx512_bf16, training in bfloat16 is 1.5 (f 16) to 1.9 times (f 64) as fast as in
     float32 (`tools/bench_training.py`). A CPU without such instructions emulates them.
     """
-    native = torch.cuda.is_bf16_supported() if device.type == "cuda" else device.type == "cpu" and cpu_has_bf16()
+    if device.type == "cuda":
+        native = torch.cuda.get_device_capability(device) >= _BF16_CAPABILITY
+    else:
+        native = device.type == "cpu" and cpu_has_bf16()
     return torch.bfloat16 if name == "bf16" or (name == "auto" and native) else torch.float32
+
+
+def visible_gpus() -> list[str]:
+    """Name the GPUs that this process may use, as CUDA_VISIBLE_DEVICES does."""
+    count = torch.cuda.device_count()
+    listed = os.environ.get("CUDA_VISIBLE_DEVICES", "")
+    return listed.split(",")[:count] if listed else [str(number) for number in range(count)]
 
 
 @cache

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
 from semgrid_eval.errors import InputError, MissingExtraError
-from semgrid_eval.executors import WorkerDied
+from semgrid_eval.executors import NoRoomError, WorkerDied
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -69,6 +69,8 @@ class RayExecutor:
             return self._ray.get(reference)
         except (self._ray.exceptions.WorkerCrashedError, self._ray.exceptions.OutOfMemoryError) as error:
             return WorkerDied(str(error).splitlines()[0])
+        except NoRoomError as error:
+            return WorkerDied(str(error.cause))  # type: ignore[attr-defined] # Ray's copy has the original as its cause
 
     def _connect(self, address: str, local_cpus: int | None) -> None:
         options: dict[str, Any] = {"num_cpus": local_cpus} if address == LOCAL else {"address": address}

@@ -9,8 +9,10 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
+import torch
+
 from semgrid_eval.errors import ConfigError, SemgridError
-from semgrid_eval.executors import Executor, InProcess, WorkerDied
+from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.device import choose_device, keep_freed_memory
 from semgrid_eval.progress import Progress, Stage, silent, silent_stage
@@ -125,8 +127,10 @@ def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stag
     """
     keep_freed_memory()
     device = choose_device(options.device)
+    # Where others do the work, the grids here need no room on the device.
+    place = device if options.executor.parallel == 1 else torch.device("cpu")
     source = partial(
-        Sources, cache=options.grids, rows=matrix.rows, executor=options.grid_executor, device=device, stage=stage
+        Sources, cache=options.grids, rows=matrix.rows, executor=options.grid_executor, device=place, stage=stage
     )
     scored = source(options.validation_logs) if options.validation_logs else None
     return Worker(out, source(logs), device, matrix.seed, stage, scored_sources=scored, trainings=options.trainings)
@@ -215,6 +219,8 @@ def _attempt(worker: Worker, unit: Unit) -> Outcome:
         job = worker.run(unit.row, unit.seed)
     except SemgridError as error:
         return Outcome(None, str(error), {})
+    except (torch.OutOfMemoryError, MemoryError) as error:
+        raise NoRoomError(f"out of memory: {str(error).partition(chr(10))[0]}") from error
     return Outcome(job.result_id, None, job.left_out)
 
 

@@ -59,6 +59,8 @@ def evaluate(
     for start in range(0, len(windows), batch):
         chosen = slice(start, start + batch)
         part = windows.batch(chosen)
+        if part.target.is_cuda:  # what is still being gathered there is not the predictor's time
+            torch.cuda.synchronize(part.target.device)
         start_s = time.perf_counter()
         with torch.inference_mode():
             certainty, prediction = predictor(_without_answer(part)).max(dim=1)

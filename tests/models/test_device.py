@@ -5,7 +5,14 @@ import torch
 
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models import device as device_module
-from semgrid_eval.models.device import choose_device, choose_precision, cpu_has_bf16, keep_freed_memory, seeded
+from semgrid_eval.models.device import (
+    choose_device,
+    choose_precision,
+    cpu_has_bf16,
+    keep_freed_memory,
+    seeded,
+    visible_gpus,
+)
 
 CPU = torch.device("cpu")
 
@@ -25,6 +32,22 @@ def test_asked_precision_is_taken_and_auto_follows_the_cpu():
     assert choose_precision("float32", CPU) == torch.float32
     assert choose_precision("bf16", CPU) == torch.bfloat16
     assert choose_precision("auto", CPU) == (torch.bfloat16 if cpu_has_bf16() else torch.float32)
+
+
+@pytest.mark.parametrize(("capability", "expected"), [((7, 5), torch.float32), ((8, 0), torch.bfloat16)])
+def test_auto_follows_what_a_gpu_multiplies_natively(monkeypatch, capability, expected):
+    monkeypatch.setattr(torch.cuda, "get_device_capability", lambda device: capability)
+    assert choose_precision("auto", torch.device("cuda:1")) == expected
+    assert choose_precision("bf16", torch.device("cuda:1")) == torch.bfloat16
+
+
+@pytest.mark.parametrize(("listed", "expected"), [(None, ["0", "1"]), ("3,GPU-7", ["3", "GPU-7"]), ("", ["0", "1"])])
+def test_gpus_are_named_as_this_process_sees_them(monkeypatch, listed, expected):
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    if listed is not None:
+        monkeypatch.setenv("CUDA_VISIBLE_DEVICES", listed)
+    assert visible_gpus() == expected
 
 
 @pytest.mark.parametrize(

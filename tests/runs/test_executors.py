@@ -1,10 +1,12 @@
 import os
+import time
+from functools import partial
 
 import numpy as np
 import pytest
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.executors import InProcess, Processes, WorkerDied, local_executor
+from semgrid_eval.executors import InProcess, NoRoomError, Processes, WorkerDied, local_executor
 
 ray = pytest.importorskip("ray", reason="the extra 'ray' is not installed")
 
@@ -13,6 +15,23 @@ def square_or_die(value):
     if value == 3:
         os._exit(1)
     return value * value, os.getpid()
+
+
+def gpu_when_all_have_begun(folder, expected, _item):
+    """Wait until that many processes have begun, so that each of them has work, and name this one's GPU."""
+    (folder / str(os.getpid())).touch()
+    end_s = time.monotonic() + 120
+    while len(list(folder.iterdir())) < expected and time.monotonic() < end_s:
+        time.sleep(0.05)
+    return os.getpid(), os.environ.get("CUDA_VISIBLE_DEVICES")
+
+
+def fit_alone(folder, item):
+    """Find room at the second time of asking, or never."""
+    if item == "never" or not (folder / item).exists():
+        (folder / item).touch()
+        raise NoRoomError("out of memory")
+    return item
 
 
 @pytest.fixture(scope="module")
@@ -36,11 +55,33 @@ def test_processes_give_every_result_and_name_a_death():
     assert WorkerDied() in dict(Processes(2).run(square_or_die, [3])).values()
 
 
+def test_a_process_that_is_killed_takes_nobody_elses_work_with_it():
+    results = dict(Processes(2).run(square_or_die, [1, 3, 2, 4]))
+    assert results.pop(1) == WorkerDied()
+    assert {index: value for index, (value, _) in results.items()} == {0: 1, 2: 4, 3: 16}
+
+
+def test_gpus_are_shared_out_among_processes(tmp_path):
+    ran = dict(Processes(3, gpus=("4", "GPU-5")).run(partial(gpu_when_all_have_begun, tmp_path, 3), range(3)))
+    assert len({pid for pid, _ in ran.values()}) == 3
+    assert sorted(gpu for _, gpu in ran.values()) in (["4", "4", "GPU-5"], ["4", "GPU-5", "GPU-5"])
+
+
+def test_what_finds_no_room_beside_others_is_tried_alone(tmp_path):
+    found = dict(Processes(2).run(partial(fit_alone, tmp_path), ["a", "b", "never"]))
+    assert found == {0: "a", 1: "b", 2: WorkerDied("out of memory")}
+    assert dict(InProcess().run(partial(fit_alone, tmp_path), ["a", "c"])) == {0: "a", 1: WorkerDied("out of memory")}
+
+
 def test_a_ray_cluster_gives_every_result_and_names_a_death(cluster):
     results = dict(cluster.run(square_or_die, [1, 2, 3, 4]))
     assert [results[i][0] for i in (0, 1, 3)] == [1, 4, 16]
     assert isinstance(results[2], WorkerDied)
     assert cluster.parallel == 2
+
+
+def test_a_ray_cluster_names_what_has_no_room(cluster, tmp_path):
+    assert dict(cluster.run(partial(fit_alone, tmp_path), ["never"])) == {0: WorkerDied("out of memory")}
 
 
 def test_a_cluster_that_is_too_small_or_absent_is_one_line(cluster):

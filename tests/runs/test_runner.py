@@ -242,6 +242,15 @@ def test_mask_modes_differ_in_the_row_of_unknown_only(logs, tmp_path, mode):
     assert counts[:, 0, 0].sum() == right_unknown + expected
 
 
+def test_a_row_that_has_no_room_is_noted_and_the_others_go_on(logs, tmp_path, monkeypatch):
+    def no_room(*_args, **_kwargs):
+        raise torch.OutOfMemoryError("CUDA out of memory.\nTried to allocate 2 GiB")
+
+    monkeypatch.setattr("semgrid_eval.runs.unit.train", no_room)
+    record = run([{"name": "ED", "model": "ed"}, {"name": "BL", "model": "newest"}], logs, tmp_path / "run")
+    assert [row.failure for row in record.rows] == ["out of memory: CUDA out of memory.", None]
+
+
 def test_two_logs_of_one_recording_are_refused(tmp_path):
     for name in ("a", "b"):
         write_log(street(1, frames=9).recording("twin"), tmp_path / "logs" / f"{name}.mcap")
