@@ -7,13 +7,26 @@ from pathlib import Path
 import semgrid_eval
 
 ROOT = Path(semgrid_eval.__file__).parent
-FLOORS = ["ground", "frames", "log", "segmentation", "grids", "sequences", "models", "scores", "runs", "report", "cli"]
+FLOORS = [
+    "ground",
+    "frames",
+    "log",
+    "segmentation",
+    "grids",
+    "sequences",
+    "models",
+    "scores",
+    "runs",
+    "report",
+    "bench",
+    "cli",
+]
 ALLOWED_IN = {
     "mcap": {"log"},
     "google": {"log"},
     "foxglove_schemas_protobuf": {"log"},
     "onnxruntime": {"segmentation"},
-    "torch": {"sequences", "models", "scores", "runs"},
+    "torch": {"sequences", "models", "scores", "runs", "bench"},
     "click": {"cli"},
     "rich": {"cli"},
     "ray": {"runs"},

@@ -18,6 +18,7 @@ _COMMANDS = {
     "report": "semgrid_eval.cli.report",
     "play": "semgrid_eval.cli.play",
     "demo": "semgrid_eval.cli.demo",
+    "bench": "semgrid_eval.cli.bench",
 }
 
 

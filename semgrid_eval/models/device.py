@@ -44,7 +44,7 @@ def choose_precision(name: Precision, device: torch.device) -> torch.dtype:
     """Turn `auto` into bfloat16 where the device multiplies in it natively, else float32.
 
     On two cores of an AMD EPYC with avx512_bf16, training in bfloat16 is 1.5 (f 16) to 1.9 times (f 64) as fast as in
-    float32 (`tools/bench_training.py`). A CPU without such instructions emulates them.
+    float32 (`semgrid-eval bench --only training`). A CPU without such instructions emulates them.
     """
     if device.type == "cuda":
         native = torch.cuda.get_device_capability(device) >= _BF16_CAPABILITY

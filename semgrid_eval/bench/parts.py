@@ -1,0 +1,65 @@
+"""The parts of the benchmark of speed, and what it is run on."""
+
+import platform
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import torch
+
+from semgrid_eval.bench import data, networks
+from semgrid_eval.bench.material import Material
+from semgrid_eval.bench.measurement import Measurement, Settings
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.progress import Progress, silent
+from semgrid_eval.runs.provenance import machine, versions
+
+_CPU_FILE = Path("/proc/cpuinfo")
+_OF_DATA = {
+    "town": data.measure_town,
+    "render": data.measure_rendering,
+    "logs": data.measure_logs,
+    "grids": data.measure_grids,
+}
+_OF_NETWORKS = {"training": networks.measure_training, "prediction": networks.measure_prediction}
+PARTS = (*_OF_DATA, *_OF_NETWORKS)
+
+
+def measure(
+    parts: Sequence[str], settings: Settings, *, device: torch.device, progress: Progress = silent
+) -> dict[str, list[Measurement]]:
+    """Measure parts of `PARTS` in their order, in this process.
+
+    Raises:
+        ConfigError: a part is not known.
+        InputError: SUMO failed.
+        MissingExtraError: SUMO or Embree is not installed, and a part needs them.
+    """
+    unknown = [part for part in parts if part not in PARTS]
+    if unknown:
+        raise ConfigError(f"{unknown[0]!r} is not one of: {', '.join(PARTS)}", field="part")
+    chosen = [part for part in PARTS if part in parts]
+    found: dict[str, list[Measurement]] = {}
+    with tempfile.TemporaryDirectory(prefix="semgrid-bench-") as folder:
+        material = Material(Path(folder), settings)
+        for part in chosen:
+            progress(len(found), len(chosen), part)
+            measurements = _OF_DATA[part](material) if part in _OF_DATA else _OF_NETWORKS[part](settings, device)
+            found[part] = list(measurements)
+    progress(len(chosen), len(chosen), "done")
+    return found
+
+
+def conditions(device: torch.device) -> dict[str, str]:
+    """Return what the numbers hold for: processor, cores, threads, device and versions."""
+    return {"processor": _processor(), **machine(device), **versions()}
+
+
+def _processor() -> str:
+    """Return the name of the processor's model."""
+    try:
+        lines = _CPU_FILE.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor() or platform.machine())

@@ -1,0 +1,54 @@
+"""`semgrid-eval bench`: how fast everything is here, beside what is promised."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from semgrid_eval.bench.measurement import FULL, QUICK, Measurement
+from semgrid_eval.cli.console import progress
+from semgrid_eval.files import write_json
+
+_SHOWN = ("processor", "cpu_cores", "torch_threads", "device", "gpu", "python", "torch", "numpy", "semgrid-eval")
+
+
+@click.command("bench", epilog="Example: semgrid-eval bench --quick --only training,prediction")
+@click.option("--only", metavar="PART,...", help="Measure these parts alone.")
+@click.option("--quick", is_flag=True, help="Once each, and the smallest network alone.")
+@click.option("--device", default="cpu", show_default=True, help="Of networks: auto, cpu, cuda or cuda:N.")
+@click.option(
+    "--json", "json_file", type=click.Path(path_type=Path, dir_okay=False), help="Write everything there, too."
+)
+def command(only: str | None, device: str, json_file: Path | None, *, quick: bool) -> None:
+    """Measure the speed of this machine: medians of three, some minutes on two cores.
+
+    town: building a town and simulating its traffic; render: recordings of it; logs: writing, reading and checking a
+    log; grids: making them; training: of networks, against a textbook's float32 loop and against the product of large
+    matrices; prediction: with networks, and scoring. Where something is promised, that stands beside the number.
+    """
+    from semgrid_eval.bench.parts import PARTS, conditions, measure
+    from semgrid_eval.models.device import choose_device
+
+    parts = PARTS if only is None else [part.strip() for part in only.split(",")]
+    chosen = choose_device(device)
+    with progress("measure") as watch:
+        found = measure(parts, QUICK if quick else FULL, device=chosen, progress=watch)
+    here = conditions(chosen)
+    if json_file:
+        told = [{"part": part, **asdict(row)} for part, rows in found.items() for row in rows]
+        write_json(json_file, {"conditions": here, "quick": quick, "measurements": told})
+    click.echo(", ".join(f"{name} {here[name]}" for name in _SHOWN if name in here))
+    for part, rows in found.items():
+        for row in rows:
+            click.echo(f"{part:<11}{row.what:<46}{_number(row.value):>8} {row.unit:<10}{_promise(row)}".rstrip())
+
+
+def _number(value: float) -> str:
+    """Show three digits that count."""
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def _promise(row: Measurement) -> str:
+    if row.kept is None:
+        return ""
+    return f"at most {row.at_most:g}: {'kept' if row.kept else 'missed'}"

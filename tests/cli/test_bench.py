@@ -1,0 +1,57 @@
+import json
+import shlex
+
+import pytest
+from click.testing import CliRunner
+
+from semgrid_eval.bench.measurement import Settings
+from semgrid_eval.bench.parts import PARTS
+from semgrid_eval.cli import bench
+from semgrid_eval.cli.main import cli, main
+
+TINY = Settings(
+    repeats=1,
+    town_size_m=250.0,
+    duration_s=15.0,
+    scale=0.125,
+    features=(2,),
+    batch=2,
+    updates=1,
+    windows=4,
+    matrix_rows=64,
+)
+
+
+@pytest.fixture
+def tiny(monkeypatch):
+    monkeypatch.setattr(bench, "QUICK", TINY)
+
+
+def test_every_part_is_measured_printed_and_written(tiny, tmp_path):
+    done = CliRunner().invoke(cli, ["bench", "--quick", "--json", str(tmp_path / "bench.json")])
+    assert done.exit_code == 0, done.output
+    conditions, *lines = done.stdout.splitlines()
+    assert conditions.startswith("processor ")
+    assert tuple(dict.fromkeys(line.split()[0] for line in lines)) == PARTS
+    told = json.loads((tmp_path / "bench.json").read_text())
+    assert len(told["measurements"]) == len(lines)
+    assert all(row["value"] > 0.0 for row in told["measurements"] if row["unit"] != "s CPU")
+    assert {row["at_most"] for row in told["measurements"]} == {None, 1.8, 12.0, 60.0}
+    assert sum("at most" in line for line in lines) == 4
+    assert {"torch", "eclipse-sumo", "cpu_cores"} <= told["conditions"].keys()
+
+
+def test_the_example_measures_the_parts_that_it_names(tiny):
+    _, *arguments = shlex.split(bench.command.epilog.removeprefix("Example: "))
+    done = CliRunner().invoke(cli, arguments)
+    assert done.exit_code == 0, done.output
+    assert {line.split()[0] for line in done.stdout.splitlines()[1:]} == {"training", "prediction"}
+    assert "f 2, against the textbook" in done.stdout
+
+
+def test_an_unknown_part_is_one_line(capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["bench", "--only", "render,tranining"])
+    assert stopped.value.code == 1
+    error = capsys.readouterr().err
+    assert error == f"Error: part: 'tranining' is not one of: {', '.join(PARTS)}\n"
