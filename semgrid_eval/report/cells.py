@@ -47,7 +47,9 @@ def number(value: float) -> str:
 
 
 def signed(value: float) -> str:
-    """Write a difference with its sign."""
+    """Write a difference with its sign; none at all has no sign."""
+    if value == 0:
+        return "0.000"
     return f"{value:+.3f}".replace("-", MINUS) if math.isfinite(value) else ABSENT
 
 
@@ -82,9 +84,9 @@ def difference_cell(difference: Estimate, verdict: str, *, title: str = "") -> C
     return Cell(signed(difference.value), _sortable(difference.value), note, title, verdict)
 
 
-def plain_cell(value: float, *, with_sign: bool = False) -> Cell:
+def plain_cell(value: float, *, title: str = "") -> Cell:
     """Show a number without an interval."""
-    return Cell(signed(value) if with_sign else number(value), _sortable(value))
+    return Cell(number(value), _sortable(value), title=title)
 
 
 def _sortable(value: float) -> float | None:

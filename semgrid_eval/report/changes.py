@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from semgrid_eval.report.cells import Cell, Line, Table, difference_cell, interval_phrase
-from semgrid_eval.report.comparison import HEADLINE, verdict
+from semgrid_eval.report.cells import Cell, Line, Table, difference_cell, interval_phrase, plural
+from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, verdict
 from semgrid_eval.report.estimates import RowScores
+from semgrid_eval.report.tables import LABELS
 
 Scores = Mapping[str, RowScores]
 
@@ -13,19 +14,17 @@ _UNSET = "not set"
 
 
 def changes_table(scores: Scores) -> Table | None:
-    """Show, for each row, the settings it changes against its model's DC row, and the difference of the mean score."""
+    """Show what each row changes against the row of its model that it is closest to, and what that does to scores."""
     entries, bodies = list(scores.values()), []
     for entry in entries:
         base = _base_of(entry, entries)
-        changed = changed_settings(_config(base), _config(entry))
-        if entry is base or not changed:
+        if base is None:
             continue
-        difference = entry.minus(base, HEADLINE)
-        title = interval_phrase(difference, with_sign=True)
-        cells = (Cell("; ".join(changed)), difference_cell(difference, verdict(difference), title=title))
+        changed = changed_settings(_config(base), _config(entry))
+        cells = (Cell("; ".join(changed)), *(_difference(entry, base, column) for column in DIFFERENCE_COLUMNS))
         bodies.append((Line(f"{entry.row.name} \N{MINUS SIGN} {base.row.name}", cells),))
-    caption = "What each row changes against the first row of its model (DC where there is one), and what that does."
-    columns = (("Settings", ""), ("Mean (known)", ""))
+    caption = "What each row changes against the row of its model that it is closest to, and what that does to scores."
+    columns = (("Settings", ""), *((LABELS[column], "") for column in DIFFERENCE_COLUMNS))
     return Table("changes", caption, "Rows", columns, tuple(bodies)) if bodies else None
 
 
@@ -48,10 +47,24 @@ def flat(config: Mapping[str, object], prefix: str = "") -> dict[str, Any]:
     return found
 
 
-def _base_of(entry: RowScores, entries: Sequence[RowScores]) -> RowScores:
-    mine = entry.row
-    alike = [e for e in entries if e.row.record.model == mine.record.model and e.row.run == mine.run]
-    return next((e for e in alike if e.row.record.experiment == "DC"), alike[0])
+def _base_of(entry: RowScores, entries: Sequence[RowScores]) -> RowScores | None:
+    """Choose, of the rows above it and the DC row of its model and run, the one with the fewest other settings.
+
+    None where there is no such row, or one that differs in nothing.
+    """
+    mine, at = entry.row, next(i for i, other in enumerate(entries) if other is entry)
+    choices = [other for i, other in enumerate(entries) if i < at or (i > at and other.row.record.experiment == "DC")]
+    alike = [each for each in choices if (each.row.record.model, each.row.run) == (mine.record.model, mine.run)]
+    counts = [(len(changed_settings(_config(other), _config(entry))), other) for other in alike]
+    count, base = min(counts, key=lambda pair: pair[0], default=(0, None))
+    return base if count else None
+
+
+def _difference(entry: RowScores, base: RowScores, column: str) -> Cell:
+    difference = entry.minus(base, column)
+    title = f"{plural(entry.row.windows, 'window')}; {plural(len(entry.row.results), 'result')}"
+    title += f"; {interval_phrase(difference, with_sign=True)}"
+    return difference_cell(difference, verdict(difference), title=title)
 
 
 def _config(entry: RowScores) -> Mapping[str, object]:

@@ -11,18 +11,22 @@ from semgrid_eval import __version__
 from semgrid_eval.files import write_json, write_text
 from semgrid_eval.report.cells import ABSENT
 from semgrid_eval.report.comparison import reference_of
+from semgrid_eval.report.diagrams import architecture_frame
 from semgrid_eval.report.estimates import CATEGORY_COLUMNS, COLUMNS, DRAWS, LEVEL, Estimate, RowScores
 from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, finding_frame, finding_records
 from semgrid_eval.report.longform import category_table, class_table
-from semgrid_eval.report.provenance import failures
-from semgrid_eval.report.reading import Run
+from semgrid_eval.report.plots import training_frame
+from semgrid_eval.report.provenance import failures, matrix_file, matrix_text, window_frame
+from semgrid_eval.report.reading import Result, Row, Run
 from semgrid_eval.report.regions import region_frame
+from semgrid_eval.report.scaling import scaling
 from semgrid_eval.report.tables import LABELS
 from semgrid_eval.report.where import BANDS, ORIGINS, Where
 
 RECORD = "report.json"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+_UNSCORED: dict[str, Any] = {"windows": 0, "scores": {}, "reference": None, "differences": {}}
 _LATEX = str.maketrans(
     {
         **{character: f"\\{character}" for character in "&%$#_{}"},
@@ -42,13 +46,18 @@ def write_tables(
     regions: Mapping[str, Scores],
     findings: Sequence[Finding],
 ) -> None:
-    """Write classes, categories, summary, regions and findings as CSV, summary.md, summary.tex and report.json."""
+    """Write every table of the report as CSV, summary.md, summary.tex, each run's matrix and report.json."""
     entries = list(scores.values())
     _write_csv(folder / "classes.csv", class_table(entries))
     _write_csv(folder / "categories.csv", category_table(entries))
     _write_csv(folder / "summary.csv", summary_table(scores))
     _write_csv(folder / "regions.csv", region_frame(regions))
     _write_csv(folder / "findings.csv", finding_frame(findings))
+    _write_csv(folder / "architecture.csv", architecture_frame(scores))
+    _write_csv(folder / "training.csv", training_frame([row for run in runs for row in run.rows]))
+    _write_csv(folder / "windows.csv", window_frame(runs))
+    for run in runs:
+        write_text(folder / matrix_file(run, runs), matrix_text(run))
     write_text(folder / "summary.md", markdown_table(scores))
     write_text(folder / "summary.tex", latex_table(scores))
     write_json(folder / RECORD, report_record(runs, scores, regions, findings))
@@ -109,34 +118,44 @@ def report_record(
     runs: Sequence[Run], scores: Scores, regions: Mapping[str, Scores], findings: Sequence[Finding]
 ) -> dict[str, Any]:
     """Return everything a machine may want to know of a report; absent values are null."""
+    scored = _row_records(scores)
     return {
         "format_version": FORMAT_VERSION,
         "semgrid_eval": __version__,
         "interval": {"level": LEVEL, "draws": DRAWS, "over": "recordings, and seeds where there are several"},
         "runs": [
-            {"tag": run.tag, "record": run.record.model_dump(mode="json", exclude={"rows": {"__all__": {"results"}}})}
+            {"tag": run.tag, "scaling": scaling(run), "record": run.record.model_dump(mode="json", exclude={"rows"})}
             for run in runs
         ],
         "failures": [vars(failure) for failure in failures(runs)],
-        "rows": _row_records(scores),
+        "rows": {row.name: _row_facts(row) | scored.get(row.name, _UNSCORED) for run in runs for row in run.rows},
         "regions": {name: _row_records(near) for name, near in regions.items()},
         "findings": finding_records(findings),
     }
 
 
+def _row_facts(row: Row) -> dict[str, Any]:
+    return row.record.model_dump(mode="json", exclude={"results"}) | {
+        "failures": row.failures,
+        "results": [_result_record(result) for result in row.results],
+    }
+
+
+def _result_record(result: Result) -> dict[str, Any]:
+    """Take all of a result's record but its windows, which `windows.csv` lists once for all rows."""
+    left_out = {"format_version", "windows", "log_digests"}
+    return result.record.model_dump(mode="json", exclude=left_out) | {"window_count": len(result.counts)}
+
+
 def _row_records(scores: Scores) -> dict[str, Any]:
     rows = [entry.row for entry in scores.values()]
-    return {name: _row_record(entry, scores, rows) for name, entry in scores.items()}
+    return {name: _scores_record(entry, scores, rows) for name, entry in scores.items()}
 
 
-def _row_record(entry: RowScores, scores: Scores, rows: Sequence[Any]) -> dict[str, Any]:
+def _scores_record(entry: RowScores, scores: Scores, rows: Sequence[Row]) -> dict[str, Any]:
     reference = reference_of(entry.row, rows)
     other = None if reference is None else scores[reference.name]
     return {
-        "experiment": entry.row.record.experiment,
-        "model": entry.row.record.model,
-        "results": [result.record.id for result in entry.row.results],
-        "seeds": [result.record.seed for result in entry.row.results],
         "windows": entry.row.windows,
         "scores": {column: _json(entry.estimate(column)) for column in COLUMNS},
         "reference": None if reference is None else reference.name,

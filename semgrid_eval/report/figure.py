@@ -2,16 +2,20 @@
 
 import io
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from matplotlib.figure import Figure
 
+from semgrid_eval.report.cells import plural
+from semgrid_eval.report.estimates import RowScores
+
 # Okabe and Ito's colours, which colour-blind readers can tell apart; the first two are those of BL and ED.
 PALETTE = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
 STROKES = ("-", "--", ":", "-.")
-INK, RULE = "#2a2f36", "#d5d9de"
-_DARK = {INK: "#dfe3e8", RULE: "#3a4048"}
+INK, MUTED, RULE = "#2a2f36", "#5d6670", "#d5d9de"
+_DARK = {INK: "#dfe3e8", MUTED: "#9aa3ad", RULE: "#3a4048"}
 SETTINGS: Any = {
     "font.family": "sans-serif",
     "font.size": 9,
@@ -35,18 +39,22 @@ SETTINGS: Any = {
     "ytick.color": INK,
     "legend.frameon": False,
 }
+PAPER_MARKS: Any = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.8}
+"""How the paper's own values are marked: small hollow diamonds."""
 _NAME_CHARACTERS = 18
 
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure in both forms, the table it was drawn from and what it shows in words."""
+    """A figure in both forms, the table it was drawn from, what it shows in words, and its natural size."""
 
     name: str
     png: bytes
     svg: str
     source: str
     caption: str
+    width_px: int
+    height_px: int
 
     @property
     def themed_svg(self) -> str:
@@ -60,6 +68,15 @@ class Plot:
             text = text.replace(colour, f"var(--c{i})")
         head, tail = text.split("<defs>", 1)
         return f"{head}{style}<defs>{tail}"
+
+
+def evidence(scores: Mapping[str, RowScores]) -> str:
+    """Count the windows and recordings behind a figure's rows."""
+    windows = {entry.row.windows for entry in scores.values()}
+    records = (w for entry in scores.values() for w in entry.row.results[0].record.windows)
+    recordings = len({window.recording for window in records})
+    count = plural(max(windows), "window") if len(windows) == 1 else f"{min(windows)} to {max(windows)} windows"
+    return f"{count} a row, {plural(recordings, 'recording')}"
 
 
 def short(name: str) -> str:
@@ -78,4 +95,5 @@ def finish(figure: Figure, name: str, source: str, caption: str) -> Plot:
         figure.savefig(picture, format="png", dpi=160, metadata={"Software": None})
         figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})
     text = drawing.getvalue().decode()
-    return Plot(name, picture.getvalue(), text[text.index("<svg") :], source, caption)
+    width_px, height_px = (round(96 * inches) for inches in figure.get_size_inches())
+    return Plot(name, picture.getvalue(), text[text.index("<svg") :], source, caption, width_px, height_px)

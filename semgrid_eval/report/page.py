@@ -14,16 +14,18 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_folder
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.report import diagrams, exports, plots, provenance, tables
+from semgrid_eval.report import bars, diagrams, exports, plots, provenance, tables
 from semgrid_eval.report.cells import Table
 from semgrid_eval.report.changes import changes_table
 from semgrid_eval.report.claims import MARGIN
+from semgrid_eval.report.colours import class_style
 from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, Headline, headline
 from semgrid_eval.report.estimates import RowScores, score_rows
 from semgrid_eval.report.examples import choose, choose_by_class, contests
 from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, find, finding_table, missing_table, sentence
 from semgrid_eval.report.panels import Group, example_group
+from semgrid_eval.report.paper import paper_table
 from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.reading import Row, Run, load_runs
 from semgrid_eval.report.regions import region_tables, score_regions
@@ -98,8 +100,8 @@ def gather(runs: Sequence[Run]) -> Material:
 def draw_figures(scores: Scores, rows: Sequence[Row], located: Sequence[Where]) -> dict[str, list[Plot]]:
     """Draw all figures by section of the page."""
     return {
-        "overview": plots.category_overview(scores),
-        "categories": plots.category_plots(scores),
+        "overview": bars.category_overview(scores),
+        "categories": bars.category_plots(scores),
         "horizon": plots.horizon_plots(scores),
         "training": plots.training_plots(rows),
         "calibration": diagrams.calibration_plots(located),
@@ -120,13 +122,14 @@ def render_page(material: Material) -> str:
     )
     environment.filters["svg_uri"] = lambda text: data_uri(text.encode(), "image/svg+xml")
     return environment.get_template("page.html.j2").render(
-        style=_source("style.css"),
-        script=_source("page.js"),
+        style=Markup(class_style()) + _source("style.css"),
+        script=_source("page.js") + _source("colours.js"),
         version=__version__,
         runs=runs,
         title=", ".join(each.record.title for each in runs),
         summary=summarise(runs, scores, found),
         tables=page_tables(runs, scores) | tables.where_tables(material.located) | region_tables(material.regions),
+        about_settings=sum(e.row.record.name not in paper_table() for e in scores.values()) > len(scores) / 2,
         findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
         margin=MARGIN,
         confusions=confusion_tables(scores, found),
@@ -138,7 +141,8 @@ def render_page(material: Material) -> str:
         failures=provenance.failures(runs),
         logs=provenance.log_table(runs),
         results=provenance.result_table(runs),
-        facts=[(each, provenance.facts(each)) for each in runs],
+        commands=provenance.command_table(runs),
+        facts=[(each, provenance.facts(each, runs)) for each in runs],
     )
 
 

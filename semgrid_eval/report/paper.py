@@ -1,4 +1,4 @@
-"""The paper's class-wise table (supplement, Table A1), to stand beside a run's values."""
+"""The paper's class-wise table (supplement, Table A1) and its training, to stand beside a run's."""
 
 from functools import cache
 from importlib import resources
@@ -8,6 +8,21 @@ import pandas as pd
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.scores.iou import category_iou
+
+PAPER_SETTINGS = {
+    "network.depth": ("depth", 3),
+    "network.features": ("features", 64),
+    "training.batch": ("batch", 32),
+    "training.epochs": ("epochs", 40),
+    "training.updates_per_epoch": ("updates an epoch", 185),
+    "training.learning_rate": ("learning rate", 1e-3),
+    "training.learning_rate_drop_epoch": ("learning rate dropped after epoch", 35),
+    "training.learning_rate_after_drop": ("learning rate then", 1e-4),
+}
+"""What the supplement says of network and training: words and value by a result's setting."""
+PAPER_REPEATS = 20
+PAPER_WINDOWS = 500
+"""One for each sequence of Cityscapes' validation set."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""The figures of scores: category bars as the paper's Fig. 5, training curves and scores over the horizon."""
+"""The curves of a report: scores over the horizon, and losses over epochs."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,22 +11,27 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 
 from semgrid_eval.classes import CATEGORY_NAMES
-from semgrid_eval.report.estimates import CATEGORY_COLUMNS, RowScores
-from semgrid_eval.report.figure import INK, PALETTE, SETTINGS, STROKES, Plot, finish, short
+from semgrid_eval.report.estimates import RowScores
+from semgrid_eval.report.figure import PALETTE, PAPER_MARKS, SETTINGS, STROKES, Plot, evidence, finish, short
+from semgrid_eval.report.paper import paper_table
 from semgrid_eval.report.reading import Row
 from semgrid_eval.report.tables import LABELS
 
 Scores = Mapping[str, RowScores]
 
-
-def category_plots(scores: Scores) -> list[Plot]:
-    """Draw the four panels of Fig. 5, one figure each."""
-    return [_category_plot(scores, (name,), f"category_{name}") for name in CATEGORY_NAMES] if scores else []
+HISTORY_COLUMNS = ("epoch", "updates", "learning_rate", "loss", "validation_loss", "seconds")
 
 
-def category_overview(scores: Scores) -> list[Plot]:
-    """Draw the four panels in one figure."""
-    return [_category_plot(scores, CATEGORY_NAMES, "categories")] if scores else []
+def training_frame(rows: Sequence[Row]) -> pd.DataFrame:
+    """Return the histories of all trainings behind the rows: row, seed and `HISTORY_COLUMNS`."""
+    columns = ["row", "seed", *HISTORY_COLUMNS]
+    parts = [
+        result.history.assign(row=row.name, seed=result.record.seed).reindex(columns=columns)
+        for row in rows
+        for result in row.results
+        if result.history is not None
+    ]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
 
 
 def training_plots(rows: Sequence[Row]) -> list[Plot]:
@@ -35,87 +40,64 @@ def training_plots(rows: Sequence[Row]) -> list[Plot]:
     if not trained:
         return []
     with mpl.rc_context(SETTINGS):
-        figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+        figure = Figure(figsize=(9.0, 3.4), layout="constrained")
         axes = figure.add_subplot()
         for index, row in enumerate(trained):
             _training_curves(axes, row, index + 1)
-        axes.set(xlabel="epoch", ylabel="loss", yscale="log")
+        axes.set(xlabel="epoch", ylabel="loss: mean cross-entropy of a cell", yscale="log")
         for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
             ticks(StrMethodFormatter("{x:g}"))
         axes.tick_params(axis="y", which="minor", labelsize=7)
-        axes.legend(fontsize=8, ncols=1 + len(trained) // 4)
+        axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
         caption = "Training loss (thin, one line a seed) and validation loss (thick, mean over seeds) by epoch."
-        return [finish(figure, "training", "history.csv of each result", caption)]
+        return [finish(figure, "training", "training.csv", caption)]
 
 
 def horizon_plots(scores: Scores) -> list[Plot]:
-    """Draw category scores over the horizon, where a model was scored at several."""
+    """Draw category scores over the horizon with intervals, where a model was scored at several."""
     lines = _horizon_lines(scores)
     if not lines:
         return []
+    drawn = {entry.row.name: entry for entries in lines.values() for entry in entries}
     with mpl.rc_context(SETTINGS):
-        figure = Figure(figsize=(7.2, 2.8), layout="constrained")
+        figure = Figure(figsize=(11.3, 3.0), layout="constrained")
         for axes, category in zip(figure.subplots(1, len(CATEGORY_NAMES), sharex=True), CATEGORY_NAMES, strict=True):
             for index, (model, entries) in enumerate(lines.items()):
-                steps = [entry.row.record.horizon_steps for entry in entries]
-                values = [entry.mean[category] for entry in entries]
-                axes.plot(steps, values, "o-", color=PALETTE[index % len(PALETTE)], label=short(model), markersize=4)
-            axes.set(title=LABELS[category], xticks=sorted({*steps}), xlabel="horizon (steps)")
-        figure.axes[0].legend(fontsize=8)
-        return [finish(figure, "horizon", "categories.csv", "Category IoU over the horizon, in steps of the inputs.")]
+                _horizon_line(axes, entries, category, PALETTE[index % len(PALETTE)], short(model))
+            axes.set_title(LABELS[category], loc="left", fontweight="bold")
+            axes.set_xticks(*_horizon_ticks(list(drawn.values())))
+            axes.margins(x=0.12)
+        figure.axes[0].set_ylabel("IoU")
+        figure.axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        figure.supxlabel("steps from the newest input to the target, and the mean time that they take", fontsize=9)
+        caption = f"Category IoU over the horizon with 95% intervals ({evidence(drawn)})"
+        beside = any(entry.row.record.name in paper_table() for entry in drawn.values())
+        caption += "; diamonds are the paper's values, on Cityscapes." if beside else "."
+        return [finish(figure, "horizon", "summary.csv", caption)]
 
 
-def _category_plot(scores: Scores, categories: Sequence[str], name: str) -> Plot:
-    assert set(categories) <= set(CATEGORY_COLUMNS)
-    experiments, models = _axes_of(scores)
-    width_in = min(14.0, max(4.6, 1.2 + 0.36 * len(experiments) * len(models)))
-    columns = min(2, len(categories))
-    lines = -(-len(categories) // columns)
-    with mpl.rc_context(SETTINGS):
-        figure = Figure(figsize=(width_in * columns, 2.7 * lines), layout="constrained")
-        panels = np.atleast_1d(figure.subplots(lines, columns, sharey=False)).ravel()
-        for axes, category in zip(panels, categories, strict=True):
-            _bars(axes, scores, category, experiments, models)
-        panels[0].legend(fontsize=8, ncols=len(models), loc="lower left", bbox_to_anchor=(0, 1.08), borderaxespad=0)
-        words = ", ".join(LABELS[category].lower() for category in categories)
-        caption = f"IoU of {words} by experiment; lines on the bars are 95% intervals."
-        return finish(figure, name, "categories.csv", caption)
+def _horizon_line(axes: Axes, entries: Sequence[RowScores], category: str, colour: str, label: str) -> None:
+    steps = [entry.row.record.horizon_steps for entry in entries]
+    estimates = [entry.estimate(category) for entry in entries]
+    axes.plot(steps, [e.value for e in estimates], "o-", color=colour, label=label, markersize=4)
+    axes.fill_between(
+        steps, [e.low for e in estimates], [e.high for e in estimates], color=colour, alpha=0.18, linewidth=0
+    )
+    for step, entry in zip(steps, entries, strict=True):
+        paper = paper_table().get(entry.row.record.name, {}).get(category)
+        if paper is not None:
+            axes.plot(step, paper, "D", markersize=4, **(PAPER_MARKS | {"markeredgecolor": colour}))
 
 
-def _bars(axes: Axes, scores: Scores, category: str, experiments: list[str], models: list[str]) -> None:
-    wide = 0.8 / len(models)
-    for at, model in enumerate(models):
-        entries = [e for e in scores.values() if _model(e) == model]
-        x = [experiments.index(_experiment(e)) + (at - (len(models) - 1) / 2) * wide for e in entries]
-        estimates = [entry.estimate(category) for entry in entries]
-        values = np.array([estimate.value for estimate in estimates])
-        axes.bar(x, np.nan_to_num(values), 0.92 * wide, color=PALETTE[at % len(PALETTE)], label=short(model))
-        for place, estimate in zip(x, estimates, strict=True):
-            if np.isfinite(estimate.low):
-                axes.plot([place, place], [estimate.low, estimate.high], color=INK, linewidth=1)
-            label = f"{estimate.value:.2f}" if np.isfinite(estimate.value) else "absent"
-            top = np.nanmax([estimate.value, estimate.high, 0.0])
-            axes.annotate(label, (place, top), (0, 2), textcoords="offset points", ha="center", fontsize=7)
-    axes.set_xticks(range(len(experiments)), [short(name) for name in experiments])
-    axes.set_title(LABELS[category], loc="right")
-    axes.set_ylabel("IoU")
-    axes.grid(visible=False, axis="x")
-    axes.margins(y=0.12)
-
-
-def _axes_of(scores: Scores) -> tuple[list[str], list[str]]:
-    """List experiments and models in the order of the matrix, baselines first."""
-    entries = list(scores.values())
-    models = dict.fromkeys(_model(e) for e in sorted(entries, key=lambda e: not e.row.is_baseline))
-    return list(dict.fromkeys(_experiment(e) for e in entries)), list(models)
-
-
-def _model(entry: RowScores) -> str:
-    return entry.row.record.model
-
-
-def _experiment(entry: RowScores) -> str:
-    return entry.row.name.removeprefix(f"{entry.row.record.model}-")
+def _horizon_ticks(entries: Sequence[RowScores]) -> tuple[list[int], list[str]]:
+    """Label each horizon by its steps and, where results know the times of their inputs, the mean seconds."""
+    leads: dict[int, list[int]] = {entry.row.record.horizon_steps: [] for entry in entries}
+    for entry in entries:
+        for window in entry.row.results[0].record.windows:
+            if window.input_stamps_ns:
+                leads[entry.row.record.horizon_steps].append(window.target_stamp_ns - window.input_stamps_ns[-1])
+    steps = sorted(leads)
+    return steps, [f"{step}\n{np.mean(leads[step]) / 1e9:.2f} s" if leads[step] else str(step) for step in steps]
 
 
 def _horizon_lines(scores: Scores) -> dict[str, list[RowScores]]:
@@ -123,7 +105,7 @@ def _horizon_lines(scores: Scores) -> dict[str, list[RowScores]]:
     lines: dict[str, list[RowScores]] = {}
     for entry in scores.values():
         if entry.row.record.experiment.startswith(("DC", "PH")):
-            lines.setdefault(_model(entry) + entry.row.name.partition(" ")[2], []).append(entry)
+            lines.setdefault(entry.row.record.model + entry.row.name.partition(" ")[2], []).append(entry)
     ordered = {m: sorted(e, key=lambda entry: entry.row.record.horizon_steps) for m, e in lines.items()}
     return {m: e for m, e in ordered.items() if len({entry.row.record.horizon_steps for entry in e}) > 1}
 

@@ -1,12 +1,17 @@
 """Where a report's numbers come from: failures, logs, results, versions and the commands that made them."""
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import pandas as pd
 import yaml
 
-from semgrid_eval.report.cells import Cell, Line, Table
-from semgrid_eval.report.reading import Run
+from semgrid_eval.report.cells import Cell, Line, Table, plural
+from semgrid_eval.report.reading import Row, Run
+from semgrid_eval.report.scaling import scaling
+
+WINDOW_COLUMNS = ("window_set", "recording", "log", "target_frame", "target_stamp_ns", "input_stamps_ns")
 
 
 @dataclass(frozen=True)
@@ -23,7 +28,9 @@ class Facts:
     """What a page says of how one run was made."""
 
     entries: tuple[tuple[str, str], ...]
+    scaling: str
     matrix: str
+    matrix_file: str
 
 
 def failures(runs: Sequence[Run]) -> list[Failure]:
@@ -35,7 +42,7 @@ def failures(runs: Sequence[Run]) -> list[Failure]:
     return found
 
 
-def facts(run: Run) -> Facts:
+def facts(run: Run, runs: Sequence[Run]) -> Facts:
     """List how a run was made."""
     record = run.record
     entries = [
@@ -44,10 +51,68 @@ def facts(run: Run) -> Facts:
         ("Started", record.started),
         ("Duration", duration(record.seconds)),
         *((f"Version of {name}", version) for name, version in sorted(record.versions.items())),
-        *((f"Machine: {name}", value) for name, value in sorted(record.machine.items())),
+        *((f"Machine: {name.replace('_', ' ')}", value) for name, value in sorted(record.machine.items())),
     ]
-    matrix = yaml.safe_dump(record.matrix, sort_keys=False, allow_unicode=True, width=100)
-    return Facts(tuple(entries), matrix)
+    return Facts(tuple(entries), scaling(run), matrix_text(run), matrix_file(run, runs))
+
+
+def matrix_text(run: Run) -> str:
+    """Write the run's matrix with every row complete, as `semgrid-eval run` reads it."""
+    return yaml.safe_dump(run.record.matrix, sort_keys=False, allow_unicode=True, width=100)
+
+
+def matrix_file(run: Run, runs: Sequence[Run]) -> str:
+    """Name the file beside the page that holds the run's matrix."""
+    return "matrix.yaml" if len(runs) == 1 else f"matrix-{1 + runs.index(run)}.yaml"
+
+
+def row_command(command: str, row: str, matrix: str) -> str:
+    """Give the command line that makes one row: the run's own, narrowed to it, or one that reads the matrix file."""
+    try:
+        words = shlex.split(command)
+    except ValueError:  # it was not written by a shell's rules
+        words = []
+    if words[:2] != ["semgrid-eval", "run"]:
+        words = ["semgrid-eval", "run", matrix, "--logs", "LOGS", "--out", "RUN"]
+    kept, skip = [], False
+    for word in words:
+        if not skip and word != "--row" and not word.startswith("--row="):
+            kept.append(word)
+        skip = not skip and word == "--row"
+    return shlex.join([*kept, "--row", row])
+
+
+def command_table(runs: Sequence[Run]) -> Table:
+    """Show what each row does and the command line that makes it again."""
+    bodies = []
+    for run in runs:
+        for row in run.rows:
+            command = row_command(run.record.command, row.record.name, matrix_file(run, runs))
+            cells = (Cell(row.record.label), Cell(_state(row)), Cell(command, tone="command"))
+            bodies.append((Line(row.name, cells),))
+    caption = (
+        "How to make each row again. A run keeps what lies in its --out already: name another folder to start anew."
+    )
+    columns = tuple((text, "") for text in ("What it does", "Results", "Command"))
+    return Table("commands", caption, "Row", columns, tuple(bodies))
+
+
+def window_frame(runs: Sequence[Run]) -> pd.DataFrame:
+    """Return one line for each window of each set of windows, with the times of its target and inputs."""
+    results = (result.record for run in runs for row in run.rows for result in row.results)
+    lines = [
+        (name, w.recording, w.log, w.target_frame, w.target_stamp_ns, " ".join(map(str, w.input_stamps_ns)))
+        for name, record in {record.windows_id: record for record in results}.items()
+        for w in record.windows
+    ]
+    return pd.DataFrame(lines, columns=list(WINDOW_COLUMNS))
+
+
+def _state(row: Row) -> str:
+    if not row.results:
+        return "failed"
+    trained = row.results[0].record.seed is not None
+    return plural(len(row.results), "seed") if trained else "no training"
 
 
 def log_table(runs: Sequence[Run]) -> Table:

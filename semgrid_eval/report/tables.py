@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.classes import CLASS_NAMES, UNKNOWN
 from semgrid_eval.report.cells import (
     ABSENT,
     Cell,
@@ -16,6 +16,7 @@ from semgrid_eval.report.cells import (
     number,
     plain_cell,
     plural,
+    signed,
     value_cell,
 )
 from semgrid_eval.report.comparison import reference_of, verdict
@@ -33,7 +34,10 @@ from semgrid_eval.report.where import BANDS, ORIGINS, Where
 
 Scores = Mapping[str, RowScores]
 
-_PAPER = "The paper's values (Table A1) come from Cityscapes' validation set."
+_PAPER = (
+    "The paper's values (Table A1) come from Cityscapes' validation set; "
+    "differences to them are marked where the row's interval leaves them out."
+)
 LABELS = {
     "static": "Static",
     "static_known": "Static (known)",
@@ -75,8 +79,9 @@ def window_means(scores: Scores) -> Table:
         columns = [score_columns(result.counts.astype(np.int64)) for result in entry.row.results]
         values = np.concatenate(columns)[:, [COLUMNS.index(column) for column in CATEGORY_COLUMNS]]
         present = np.isfinite(values)
-        total, number = np.where(present, values, 0.0).sum(axis=0), present.sum(axis=0)
-        rows.append((name, np.divide(total, number, out=np.full(len(number), np.nan), where=number > 0)))
+        total, count = np.where(present, values, 0.0).sum(axis=0), present.sum(axis=0)
+        means = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
+        rows.append((name, means, [f"{name}: {plural(int(n), 'window')} with it; {_seeds(entry)}" for n in count]))
     caption = "Mean over windows of each window's own category scores; windows without a category are left out."
     return _plain_table("windows", caption, [LABELS[column] for column in CATEGORY_COLUMNS], rows)
 
@@ -113,7 +118,10 @@ def run_differences(scores: Scores, tags: Sequence[str], columns: Sequence[str])
     for group in groups.values():
         for entry in group[1:]:
             differences = [entry.minus(group[0], column) for column in columns]
-            cells = tuple(difference_cell(d, verdict(d), title=_interval_text(d)) for d in differences)
+            cells = tuple(
+                difference_cell(d, verdict(d), title=f"{_evidence(entry, c)}; difference: {_interval_text(d)}")
+                for c, d in zip(columns, differences, strict=True)
+            )
             bodies.append((Line(f"{entry.row.name} \N{MINUS SIGN} {group[0].row.name}", cells),))
     caption = f"The same rows in several runs: differences to {tags[0] if tags else 'the first run'}."
     return Table("runs", caption, "Rows", _headers(scores, columns), tuple(bodies)) if bodies else None
@@ -127,10 +135,19 @@ def _value_body(entry: RowScores, best: Mapping[str, float], *, beside_paper: bo
     lines = [Line(entry.row.name, values, title=entry.row.record.label)]
     paper = paper_table().get(entry.row.record.name, {}) if beside_paper else {}
     if set(best) <= set(paper):
-        lines.append(Line("paper", tuple(plain_cell(paper[name]) for name in best), "paper"))
-        gaps = (entry.mean[name] - paper[name] for name in best)
-        lines.append(Line("difference", tuple(plain_cell(gap, with_sign=True) for gap in gaps), "paper"))
+        source = f"the paper's {entry.row.record.name}, Table A1: mean over 20 seeds, Cityscapes"
+        lines.append(Line("paper", tuple(plain_cell(paper[name], title=source) for name in best), "paper"))
+        gaps = tuple(_paper_gap(entry, name, paper[name]) for name in best)
+        lines.append(Line("difference", gaps, "paper"))
     return tuple(lines)
+
+
+def _paper_gap(entry: RowScores, column: str, paper: float) -> Cell:
+    """Show the difference to the paper's value, of which no interval is known: the row's own, moved by it."""
+    mine = entry.estimate(column)
+    gap = Estimate(mine.value - paper, mine.low - paper, mine.high - paper)
+    title = f"{_evidence(entry, column)}; less the paper's {number(paper)}: {_interval_text(gap)}"
+    return Cell(signed(gap.value), gap.value if np.isfinite(gap.value) else None, title=title, tone=verdict(gap))
 
 
 def _headers(scores: Scores, columns: Sequence[str]) -> tuple[tuple[str, str], ...]:
@@ -159,10 +176,15 @@ def _evidence(entry: RowScores, column: str) -> str:
         f"{row.name}, {LABELS[column]}: {number(entry.mean[column])}",
         plural(cells, "target cell"),
         plural(row.windows, "window"),
-        plural(len(row.results), "seed") if row.results[0].record.seed is not None else "no chance involved",
+        _seeds(entry),
         interval_phrase(entry.estimate(column)),
     ]
     return "; ".join(parts)
+
+
+def _seeds(entry: RowScores) -> str:
+    results = entry.row.results
+    return plural(len(results), "seed") if results[0].record.seed is not None else "no chance involved"
 
 
 def _interval_text(difference: Estimate) -> str:
@@ -175,10 +197,20 @@ def where_tables(found: Sequence[Where]) -> dict[str, Table | None]:
         return {"distance": None, "origin": None}
     distance = "Mean class IoU without unknown by distance from the vehicle (first repeat)."
     origin = "Share of the target's known cells that are predicted right, by where the inputs had seen something there."
+    bands = [(e.row.name, e.band_scores(), _cell_titles(e, axis=0)) for e in found]
+    origins = [(e.row.name, e.origin_shares(), _cell_titles(e, axis=1)) for e in found]
     return {
-        "distance": _plain_table("distance", distance, BANDS, [(e.row.name, e.band_scores()) for e in found]),
-        "origin": _plain_table("origin", origin, ORIGINS, [(e.row.name, e.origin_shares()) for e in found]),
+        "distance": _plain_table("distance", distance, BANDS, bands),
+        "origin": _plain_table("origin", origin, ORIGINS, origins),
     }
+
+
+def _cell_titles(entry: Where, *, axis: int) -> list[str]:
+    """Count the target's known cells in each band of distance (axis 0) or origin (axis 1), for tooltips."""
+    known = entry.cells[..., np.arange(len(CLASS_NAMES)) != UNKNOWN, :]
+    counts = np.moveaxis(known, axis, 0).reshape(known.shape[axis], -1).sum(axis=1)
+    shown = f"{plural(entry.row.windows, 'window')}; first repeat; no interval"
+    return [f"{entry.row.name}: {plural(int(count), 'known target cell')}; {shown}" for count in counts]
 
 
 def confusion_table(entry: RowScores, name: str) -> Table:
@@ -190,26 +222,32 @@ def confusion_table(entry: RowScores, name: str) -> Table:
         (
             Line(
                 LABELS[target],
-                tuple(_share_cell(value, target, other) for other, value in zip(CLASS_NAMES, line, strict=True)),
+                tuple(
+                    _share_cell(value, int(count), target, other)
+                    for other, value, count in zip(CLASS_NAMES, line, numbers, strict=True)
+                ),
             ),
         )
-        for target, line in zip(CLASS_NAMES, shares, strict=True)
+        for target, line, numbers in zip(CLASS_NAMES, shares, np.asarray(counts), strict=True)
     )
     caption = f"{entry.row.name}: how each class of the target (line) is predicted (column), in percent of its cells."
     return Table(name, caption, "Target", tuple((LABELS[c], "") for c in CLASS_NAMES), bodies)
 
 
-def _share_cell(value: float, target: str, other: str) -> Cell:
+def _share_cell(value: float, count: int, target: str, other: str) -> Cell:
     if not np.isfinite(value):
         return Cell(ABSENT)
-    title = f"{value:.2%} of {LABELS[target]} is predicted as {LABELS[other]}"
+    title = f"{plural(count, 'cell')}, {value:.2%} of {LABELS[target]}, over all windows and seeds: {LABELS[other]}"
     return Cell(f"{100 * value:.1f}", value, title=title, tone="heat")
 
 
 def _plain_table(
-    name: str, caption: str, columns: Sequence[str], rows: Sequence[tuple[str, NDArray[np.float64]]]
+    name: str, caption: str, columns: Sequence[str], rows: Sequence[tuple[str, NDArray[np.float64], list[str]]]
 ) -> Table:
-    bodies = tuple((Line(row, tuple(plain_cell(float(value)) for value in values)),) for row, values in rows)
+    bodies = tuple(
+        (Line(row, tuple(plain_cell(float(v), title=text) for v, text in zip(values, titles, strict=True))),)
+        for row, values, titles in rows
+    )
     return Table(name, caption, "Row", tuple((column, "") for column in columns), bodies)
 
 
@@ -222,8 +260,8 @@ def training_table(rows: Sequence[RowScores]) -> Table:
         cells = (
             Cell(f"{records[0].parameters:,}" if records[0].parameters else "none", records[0].parameters or 0),
             Cell(str(len(records)), len(records)),
-            Cell(f"{np.mean(train):.0f} s" if train else "none", float(np.mean(train)) if train else 0.0),
-            Cell(_per_window(entry), None),
+            _time_cell("s", train, 0),
+            _time_cell("ms a window", [1000 * r.predict_seconds / entry.row.windows for r in records], 1),
             Cell(", ".join(sorted({record.device for record in records}))),
         )
         bodies.append((Line(entry.row.name, cells),))
@@ -231,6 +269,10 @@ def training_table(rows: Sequence[RowScores]) -> Table:
     return Table("costs", "What each row cost; times are means over seeds.", "Row", columns, tuple(bodies))
 
 
-def _per_window(entry: RowScores) -> str:
-    seconds = float(np.mean([result.record.predict_seconds for result in entry.row.results]))
-    return f"{1000 * seconds / entry.row.windows:.1f} ms a window"
+def _time_cell(unit: str, times: Sequence[float], digits: int) -> Cell:
+    """Show a mean time, with its range over seeds in the tooltip."""
+    if not times:
+        return Cell("none")
+    mean = float(np.mean(times))
+    title = f"mean of {plural(len(times), 'result')}; {min(times):,.{digits}f} to {max(times):,.{digits}f} {unit}"
+    return Cell(f"{mean:,.{digits}f} {unit}", mean, title=title)

@@ -1,9 +1,10 @@
 from pathlib import Path
 
 import pytest
-from support.fake_run import make_fake_run
+from support.fake_run import HOSTILE, FakeRow, make_fake_run
 
 from semgrid_eval.report.page import write_report
+from semgrid_eval.scores.results import read_run, result_folder, write_run
 
 
 @pytest.fixture(scope="session")
@@ -15,3 +16,28 @@ def run(tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def page(run, tmp_path_factory) -> Path:
     return write_report(run, tmp_path_factory.mktemp("reports") / "report")
+
+
+@pytest.fixture(scope="session")
+def side_by_side(run, tmp_path_factory) -> Path:
+    """The page of two runs: `run` and a smaller one named `other`."""
+    rows = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.3, 1))
+    other = make_fake_run(tmp_path_factory.mktemp("runs") / "other", rows=rows, windows=1)
+    return write_report([run, other], tmp_path_factory.mktemp("reports") / "both")
+
+
+@pytest.fixture(scope="session")
+def troubled(tmp_path_factory) -> Path:
+    """The page of a run whose names are as hostile as can be, with a failed row, a damaged result and a failed log."""
+    failed = FakeRow("Sp2", "ED", failure="out of memory")
+    kinds = (*(FakeRow(e, m, 0.1, int(m == "ED")) for m in ("BL", "ED") for e in ("DC", "NT")), FakeRow("Fuse", "BL"))
+    run = make_fake_run(tmp_path_factory.mktemp("runs") / "run", recordings=2, windows=1, rows=(*kinds, failed))
+    record = read_run(run)
+    hostile = tuple(
+        row.model_copy(update={"name": name, "label": name, "experiment": f"{i} {name}", "sensors": (name,)})
+        for i, (row, name) in enumerate(zip(record.rows, HOSTILE, strict=False))
+    )
+    (result_folder(run, record.rows[4].results[0]) / "counts.npz").write_bytes(b"not a zip")
+    rows, broken = (*hostile, *record.rows[4:]), {name: name for name in HOSTILE}
+    write_run(run, record.model_copy(update={"title": " ".join(HOSTILE), "rows": rows, "failed_logs": broken}))
+    return write_report(run, tmp_path_factory.mktemp("reports") / "troubled")

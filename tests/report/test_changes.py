@@ -24,15 +24,37 @@ def test_nested_settings_get_dotted_names():
     assert flat({"a": {"b": {"c": 1}}, "d": 2}) == {"a.b.c": 1, "d": 2}
 
 
+def _with_config(row, name, **config):
+    results = tuple(replace(r, record=r.record.model_copy(update={"config": config})) for r in row.results)
+    record = row.record.model_copy(update={"name": name, "experiment": name})
+    return replace(row, name=name, record=record, results=results)
+
+
 def test_each_row_is_set_against_the_dc_row_of_its_model(run):
     scores = score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=20)
     table = changes_table(scores)
     assert [body[0].header for body in table.bodies] == [
         f"{name} \N{MINUS SIGN} {name[:2]}-DC" for name in ("BL-NT", "BL-Fuse", "BL-Sp2", "ED-Sp2")
     ]
-    settings, score = table.bodies[-1][0].cells
+    settings, *_, mean = table.bodies[-1][0].cells
     assert settings.text == "experiment DC to Sp2"
-    assert score.sort == pytest.approx(scores["ED-Sp2"].mean["mean_known"] - scores["ED-DC"].mean["mean_known"])
+    assert mean.sort == pytest.approx(scores["ED-Sp2"].mean["mean_known"] - scores["ED-DC"].mean["mean_known"])
+    for words in ("16 windows", "2 results", "95% interval"):
+        assert words in mean.title
+
+
+def test_a_row_is_set_against_the_one_with_the_fewest_other_settings(run):
+    row = load_runs([run])[0].rows[0]
+    settings = {
+        "default": {"y": "down", "overlay": "upper", "sensors": 1},
+        "two": {"y": "down", "overlay": "upper", "sensors": 2},
+        "lower": {"y": "down", "overlay": "lower", "sensors": 2},
+        "again": {"y": "down", "overlay": "upper", "sensors": 1},  # the same as the first: nothing to show
+    }
+    rows = [_with_config(row, name, **config) for name, config in settings.items()]
+    table = changes_table(score_rows(rows, np.random.default_rng(0), draws=2))
+    assert [body[0].header for body in table.bodies] == ["two \N{MINUS SIGN} default", "lower \N{MINUS SIGN} two"]
+    assert [body[0].cells[0].text for body in table.bodies] == ["sensors 1 to 2", "overlay upper to lower"]
 
 
 def test_rows_that_change_nothing_give_no_table(run):

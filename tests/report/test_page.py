@@ -1,4 +1,5 @@
 import filecmp
+import os
 import re
 import subprocess
 import sys
@@ -6,13 +7,12 @@ from html.parser import HTMLParser
 
 import pandas as pd
 import pytest
-from support.fake_run import FakeRow, make_fake_run
+from support.fake_run import HOSTILE, FakeRow, make_fake_run
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import read_json
 from semgrid_eval.report.page import write_report
-from semgrid_eval.scores.results import read_run, write_run
 
 VOID = {"meta", "link", "img", "input", "br"}
 
@@ -134,10 +134,18 @@ def test_files_beside_the_page_are_there(page):
         assert {f"figures/{name}.png", f"figures/{name}.svg"} <= names
 
 
-def test_the_same_run_gives_the_same_bytes(run, page, tmp_path):
-    again = write_report(run, tmp_path / "again").parent
+def test_the_same_run_gives_the_same_bytes_without_torch(run, page, tmp_path):
+    code = """import sys
+from pathlib import Path
+from semgrid_eval.report.page import write_report
+write_report(Path(sys.argv[1]), Path(sys.argv[2]))
+assert 'torch' not in sys.modules and 'semgrid_eval.runs' not in sys.modules"""
+    again = tmp_path / "again"
+    environment = {**os.environ, "PYTHONHASHSEED": "4711"}
+    subprocess.run([sys.executable, "-c", code, run, again], check=True, env=environment)
     names = [str(path.relative_to(again)) for path in again.rglob("*") if path.is_file()]
     assert filecmp.cmpfiles(page.parent, again, names, shallow=False) == (names, [], [])
+    assert len(names) == sum(path.is_file() for path in page.parent.rglob("*"))
 
 
 def test_a_folder_that_is_no_report_is_left_alone(run, tmp_path):
@@ -158,24 +166,45 @@ def test_failed_rows_only(tmp_path):
     assert "No row has a score" in text
     assert "row ED-DC out of memory" in text
     assert pd.read_csv(page.parent / "classes.csv").empty
+    assert read_json(page.parent / "report.json")["rows"]["ED-DC"]["scores"] == {}
 
 
-def test_one_row_only_in_the_default_place_where_an_old_report_is_replaced(tmp_path):
-    old = tmp_path / "run" / "report"
-    old.mkdir(parents=True)
-    for name in ("report.json", "index.html"):
+@pytest.fixture(scope="module")
+def lonely(tmp_path_factory):
+    """The page of one row and one window, in the default place, where an older report lies."""
+    run = make_fake_run(
+        tmp_path_factory.mktemp("runs") / "run", rows=(FakeRow("DC", "BL"),), recordings=1, windows=1, truth=False
+    )
+    old = run / "report"
+    old.mkdir()
+    for name in ("report.json", "index.html", "old.txt"):
         (old / name).touch()
-    (old / "old.txt").touch()
-    page = _report_of(tmp_path, rows=(FakeRow("DC", "BL"),), truth=False)
-    assert page == old / "index.html"
-    assert not (old / "old.txt").exists()
-    text = _read(page).text
+    return write_report(run)
+
+
+def test_an_old_report_in_the_default_place_is_replaced(lonely):
+    assert lonely.parent.name == "report"
+    assert (lonely.parent.parent / "run.json").is_file()
+    assert not (lonely.parent / "old.txt").exists()
+
+
+def test_one_row_only(lonely):
+    text = _read(lonely).text
     assert "BL-DC predicts best" in text
     assert "no other row to compare with" in text
     assert "No row was trained" in text
     assert "This run lacks the rows to test any of the 25 claims" in text
     assert "No result here knows the truth about actors" in text
-    assert pd.read_csv(page.parent / "regions.csv").empty
+    assert pd.read_csv(lonely.parent / "regions.csv").empty
+
+
+def test_a_class_in_neither_target_nor_prediction_is_a_dash_and_empty(lonely):
+    classes = pd.read_csv(lonely.parent / "classes.csv").set_index("class")
+    absent = [name for name in CLASS_NAMES if pd.isna(classes.iou[name])]
+    assert absent
+    assert (classes.cells[absent] == 0).all()
+    assert "\N{EN DASH}" in _read(lonely).text
+    assert read_json(lonely.parent / "report.json")["rows"]["BL-DC"]["scores"][absent[0]]["value"] is None
 
 
 def test_zero_windows(tmp_path):
@@ -185,54 +214,23 @@ def test_zero_windows(tmp_path):
     assert "row BL-DC it has no window to score" in text
 
 
-def test_a_class_in_neither_target_nor_prediction_is_a_dash_and_empty(tmp_path):
-    run = make_fake_run(tmp_path / "run", rows=(FakeRow("DC", "BL"),), recordings=1, windows=1)
-    page = write_report(run)
-    classes = pd.read_csv(page.parent / "classes.csv").set_index("class")
-    absent = [name for name in CLASS_NAMES if pd.isna(classes.iou[name])]
-    assert absent
-    assert (classes.cells[absent] == 0).all()
-    assert "\N{EN DASH}" in _read(page).text
-    assert read_json(page.parent / "report.json")["rows"]["BL-DC"]["scores"][absent[0]]["value"] is None
+def test_a_damaged_result_fails_its_row_and_the_rest_goes_on(troubled):
+    text = _read(troubled).text
+    assert "row BL-Fuse" in text
+    assert "/counts.npz" in text
+    assert "predicts best" in text
 
 
-def test_a_damaged_result_fails_its_row_and_the_rest_goes_on(tmp_path):
-    rows = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 1))
-    run = make_fake_run(tmp_path / "run", rows=rows, recordings=2, windows=1)
-    victim = read_run(run).rows[0].results[0]
-    (run / "results" / victim / "counts.npz").write_bytes(b"not a zip")
-    text = _read(write_report(run)).text
-    assert f"{victim}/counts.npz" in text
-    assert "ED-DC predicts best" in text
-
-
-HOSTILE = ("<script>alert(1)</script>", "\"quoted\" & 'more'", "{{ 7 * 7 }} $x_1$ \\frac", "n" * 10_000)
-
-
-def test_names_are_shown_as_text(tmp_path):
-    kinds = (FakeRow("DC", "BL"), FakeRow("NT", "BL"), FakeRow("DC", "ED", 0.1, 1), FakeRow("NT", "ED", 0.1, 1))
-    run = make_fake_run(tmp_path / "run", recordings=2, windows=1, rows=kinds)
-    record = read_run(run)
-    rows = tuple(
-        row.model_copy(update={"name": name, "label": name, "experiment": f"{i} {name}", "sensors": (name,)})
-        for i, (row, name) in enumerate(zip(record.rows, HOSTILE, strict=True))
-    )
-    broken = {name: name for name in HOSTILE}
-    write_run(run, record.model_copy(update={"title": " ".join(HOSTILE), "rows": rows, "failed_logs": broken}))
-    found = _read(write_report(run))
+def test_names_are_shown_as_text(troubled):
+    found = _read(troubled)
     assert len(found.all("script")) == 1
     for name in HOSTILE:
         assert found.text.count(name) > 3
 
 
-def test_several_runs_are_shown_side_by_side(run, tmp_path):
-    other = make_fake_run(tmp_path / "other", rows=(FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.3, 1)), windows=1)
-    page = write_report([run, other], tmp_path / "both")
-    text = _read(page).text
+def test_several_runs_are_shown_side_by_side(side_by_side):
+    text = _read(side_by_side).text
     assert "ED-DC (other) \N{MINUS SIGN} ED-DC (run)" in text
     assert "BL-DC (run)" in text
-
-
-def test_a_report_needs_no_torch():
-    code = "import sys; import semgrid_eval.report.page; assert 'torch' not in sys.modules"
-    subprocess.run([sys.executable, "-c", code], check=True)
+    for number in (1, 2):
+        assert (side_by_side.parent / f"matrix-{number}.yaml").is_file()

@@ -8,8 +8,9 @@ import pytest
 from PIL import Image
 from support.fake_run import FakeRow, make_fake_run
 
-from semgrid_eval.report import plots
+from semgrid_eval.report import bars, plots
 from semgrid_eval.report.estimates import score_rows
+from semgrid_eval.report.figure import INK
 from semgrid_eval.report.reading import load_runs
 
 
@@ -23,12 +24,16 @@ def scores(rows):
     return score_rows(rows, np.random.default_rng(0), draws=20)
 
 
+@pytest.fixture(scope="module")
+def panels(scores):
+    return bars.category_plots(scores)
+
+
 def _texts(svg):
     return [element.text for element in ET.fromstring(svg).iter() if element.tag.endswith("text")]
 
 
-def test_there_is_a_panel_for_each_category_with_every_experiment(scores):
-    panels = plots.category_plots(scores)
+def test_there_is_a_panel_for_each_category_with_every_experiment(panels, scores):
     assert [panel.name for panel in panels] == [
         "category_static",
         "category_small_static",
@@ -41,11 +46,11 @@ def test_there_is_a_panel_for_each_category_with_every_experiment(scores):
     assert Image.open(io.BytesIO(panels[0].png)).width > 500
 
 
-def test_the_themed_drawing_keeps_its_text_and_follows_the_theme(scores):
-    panel = plots.category_plots(scores)[0]
+def test_the_themed_drawing_keeps_its_text_and_follows_the_theme(panels):
+    panel = panels[0]
     assert _texts(panel.themed_svg) == _texts(panel.svg)
     assert "prefers-color-scheme:dark" in panel.themed_svg
-    assert plots.INK not in panel.themed_svg.split("</style>", 1)[1]
+    assert INK not in panel.themed_svg.split("</style>", 1)[1]
 
 
 def test_trained_rows_have_curves(rows):
@@ -74,7 +79,7 @@ def test_names_in_any_script_are_drawn(rows, scores):
     entry = scores["ED-DC"]
     record = entry.row.record.model_copy(update={"model": "\u6a21\u578b \x1b[0m", "experiment": "DC"})
     odd = {"odd": replace(entry, row=replace(entry.row, name="\u9053\u8def", record=record))}
-    panel = plots.category_plots(odd)[0]
+    panel = bars.category_plot(odd, ("static",), "odd")
     assert "\u9053\u8def" in _texts(panel.svg)
     assert "\u6a21\u578b  [0m" in _texts(panel.svg)
 

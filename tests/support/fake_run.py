@@ -17,6 +17,9 @@ FRAME_NS = 58_823_529
 Grid = NDArray[np.uint8]
 ID = {name: index for index, name in enumerate(CLASS_NAMES)}
 
+HOSTILE = ("<script>alert(1)</script>", "\"quoted\" & 'more'", "{{ 7 * 7 }} $x_1$ \\frac", "n" * 10_000)
+"""Names that must be shown as text, wherever they come from."""
+
 
 @dataclass(frozen=True)
 class FakeRow:

@@ -23,11 +23,11 @@
     table.append(...bodies);
   };
 
-  const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+  const quoted = (text) => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
 
   const label = (cell) => {
     const copy = cell.cloneNode(true);
-    copy.querySelectorAll("small, .mark").forEach((part) => part.remove());
+    copy.querySelectorAll("small, .mark, .copy").forEach((part) => part.remove());
     return copy.textContent.trim();
   };
 
@@ -51,12 +51,23 @@
     return made;
   };
 
+  // What stands behind a number is its tooltip; a touch screen has none, so a tap shows it above the table.
+  const tell = (tip, table, cell) => {
+    if (!cell) return;
+    table.querySelectorAll(".told").forEach((other) => other.classList.remove("told"));
+    cell.classList.add("told");
+    tip.value = cell.title;
+  };
+
   for (const holder of document.querySelectorAll("[data-table]")) {
     const table = holder.querySelector("table"), name = holder.dataset.table;
     [...table.tHead.rows[0].cells].forEach((head, column) => {
       head.prepend(element("button", { type: "button", onclick: () => sort(table, column) }, head.firstChild));
     });
     const tools = element("div", { className: "tools" });
+    const tip = element("output", { className: "tip" });
+    tools.append(tip);
+    table.addEventListener("click", (event) => tell(tip, table, event.target.closest("td[title]")));
     if (table.tBodies.length > 3) {
       const find = element("input", { type: "search", placeholder: "Filter rows" });
       find.setAttribute("aria-label", `Filter rows: ${table.caption.textContent}`);
@@ -96,6 +107,26 @@
     views.prepend(element("figure", { className: "flip" }, picture, element("figcaption", {}, play, slider), title));
   };
   document.querySelectorAll(".views").forEach(flip);
+
+  for (const cell of document.querySelectorAll("td.command")) {
+    const copy = element("button", { type: "button", className: "copy" }, "Copy");
+    copy.setAttribute("aria-label", `Copy: ${cell.textContent}`);
+    copy.onclick = async () => {
+      getSelection().selectAllChildren(cell.querySelector("code"));
+      try { await navigator.clipboard.writeText(cell.querySelector("code").textContent); }
+      catch { return; } // the command is selected, so that it can be copied by hand
+      copy.textContent = "Copied";
+      setTimeout(() => { copy.textContent = "Copy"; }, 1500);
+    };
+    cell.append(copy);
+  }
+
+  for (const canvas of document.querySelectorAll(".canvas")) {
+    if (canvas.scrollWidth <= canvas.clientWidth) continue;
+    canvas.tabIndex = 0; // what scrolls must be reached by keyboard, too
+    canvas.setAttribute("role", "region");
+    canvas.setAttribute("aria-label", canvas.firstElementChild.alt);
+  }
 
   const links = new Map([...document.querySelectorAll("nav a")].map((link) => [link.hash.slice(1), link]));
   const seen = new IntersectionObserver((entries) => {
