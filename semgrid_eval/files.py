@@ -32,7 +32,7 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
             os.fsync(stream.fileno())
         partial.replace(path)
     except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror or error}", path=path) from error
+        raise InputError(f"cannot be written: {_reason(error)}", path=path) from error
     finally:
         with suppress(OSError):  # it is gone after success, and its folder may never have been one
             partial.unlink()
@@ -49,7 +49,7 @@ def atomic_folder(path: Path) -> Iterator[Path]:
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent))
     except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror or error}", path=path) from error
+        raise InputError(f"cannot be written: {_reason(error)}", path=path) from error
     try:
         partial.chmod(0o755)
         yield partial
@@ -57,7 +57,7 @@ def atomic_folder(path: Path) -> Iterator[Path]:
             shutil.rmtree(path)
         partial.replace(path)
     except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror or error}", path=path) from error
+        raise InputError(f"cannot be written: {_reason(error)}", path=path) from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 
@@ -110,6 +110,11 @@ def digest_files(paths: Iterable[Path]) -> str:
             raise InputError(f"cannot be read: {error.strerror or error}", path=path) from error
         total.update(part.digest())
     return total.hexdigest()[:DIGEST_CHARACTERS]
+
+
+def _reason(error: OSError) -> str:
+    # numpy has no error number for arrays that were written in part.
+    return error.strerror or f"{error} (no space left?)"
 
 
 def _partial_name(path: Path) -> Path:

@@ -42,6 +42,15 @@ def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
         pass
 
 
+def test_an_array_that_was_written_in_part_is_a_full_disk(tmp_path):
+    with (
+        pytest.raises(InputError, match=r"town: cannot be written: 8 requested and 3 written \(no space left\?\)"),
+        atomic_folder(tmp_path / "town"),
+    ):
+        raise OSError("8 requested and 3 written")  # as numpy has it
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_digest_of_a_value_ignores_the_order_of_keys_but_no_value():
     assert digest_value({"a": 1, "b": [1, 2]}) == digest_value({"b": [1, 2], "a": 1})
     assert digest_value({"a": 1}) != digest_value({"a": 2})

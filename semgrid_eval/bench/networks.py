@@ -13,7 +13,7 @@ from semgrid_eval.bench.material import random_windows
 from semgrid_eval.bench.measurement import Measurement, Settings, wall_s
 from semgrid_eval.bench.textbook import train_by_the_book
 from semgrid_eval.models.baselines import RepeatNewest
-from semgrid_eval.models.device import choose_precision
+from semgrid_eval.models.device import Precision, choose_precision
 from semgrid_eval.models.network import NetworkConfig, NetworkPredictor, seeded_network
 from semgrid_eval.models.training import TrainingConfig, masked_loss, train
 from semgrid_eval.scores.evaluate import evaluate
@@ -34,7 +34,10 @@ def measure_training(settings: Settings, device: torch.device) -> Iterator[Measu
         rate = _training_rate(config, settings, device)
         share = rate * _flops_of_an_update(config, settings.batch) / settings.batch / matrix_rate
         yield Measurement(f"f {features}, batch {settings.batch}, {name}", rate, "windows/s")
-        yield Measurement(f"f {features}, textbook float32", slow, "windows/s")
+        if dtype is not torch.float32:
+            plain = _training_rate(config, settings, device, precision="float32")
+            yield Measurement(f"f {features}, batch {settings.batch}, float32", plain, "windows/s")
+        yield Measurement(f"f {features}, batch {settings.batch}, textbook", slow, "windows/s")
         yield Measurement(f"f {features}, against the textbook", rate / slow, "times")
         yield Measurement(f"f {features}, against the product of matrices", 100.0 * share, "%")
 
@@ -67,8 +70,12 @@ def _textbook_rate(config: NetworkConfig, settings: Settings, device: torch.devi
     return settings.updates * settings.batch / median(seconds[1:])
 
 
-def _training_rate(config: NetworkConfig, settings: Settings, device: torch.device) -> float:
-    training = TrainingConfig(epochs=settings.repeats + 1, updates_per_epoch=settings.updates, batch=settings.batch)
+def _training_rate(
+    config: NetworkConfig, settings: Settings, device: torch.device, *, precision: Precision = "auto"
+) -> float:
+    training = TrainingConfig(
+        epochs=settings.repeats + 1, updates_per_epoch=settings.updates, batch=settings.batch, precision=precision
+    )
     with tempfile.TemporaryDirectory() as folder:
         trained = train(random_windows(), config, training, seed=0, device=device, folder=Path(folder))
     return settings.updates * settings.batch / median(row.seconds for row in trained.history[1:])

@@ -70,8 +70,7 @@ def convert_recordings(
         if isinstance(outcome, WorkerDied):
             summary.failed[job.label] = outcome.reason
         elif outcome.disk_full:
-            whole = len(summary.written) + len(summary.skipped)
-            raise InputError(f"{outcome.failure}; {whole} of {len(jobs)} logs are whole and stay; make room and go on")
+            raise InputError(f"{outcome.failure}; what is written is whole: make room, and the same command goes on")
         elif outcome.failure is not None:
             summary.failed[job.label] = outcome.failure
         else:
