@@ -33,6 +33,12 @@ _LATEX = str.maketrans(
         "~": r"\textasciitilde{}",
         "^": r"\textasciicircum{}",
         "\\": r"\textbackslash{}",
+        "<": r"\textless{}",
+        ">": r"\textgreater{}",
+        "|": r"\textbar{}",
+        '"': r"\textquotedbl{}",
+        "[": "{[}",  # at the start of a line it would belong to the line break before it
+        "*": "{*}",
     }
 )
 
@@ -110,7 +116,7 @@ def latex_table(scores: Scores) -> str:
     """Write the category scores as a LaTeX table (package booktabs)."""
     heads = " & ".join(["Row", *(LABELS[column] for column in CATEGORY_COLUMNS)])
     lines = [r"\begin{tabular}{l" + "r" * len(CATEGORY_COLUMNS) + "}", r"\toprule", heads + r" \\", r"\midrule"]
-    lines += [" & ".join([name.translate(_LATEX), *_texts(entry)]) + r" \\" for name, entry in scores.items()]
+    lines += [" & ".join([_latex(name), *_texts(entry)]) + r" \\" for name, entry in scores.items()]
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""]).replace(ABSENT, "--")
 
 
@@ -177,8 +183,17 @@ def _texts(entry: RowScores) -> list[str]:
 
 
 def _markdown(text: str) -> str:
-    escaped = "".join(f"\\{character}" if character in "\\`*_{}[]<>#|!" else character for character in text)
-    return " ".join(escaped.split())
+    escaped = "".join(f"\\{character}" if character in "\\`*_{}[]<>#|!&$~" else character for character in text)
+    return _one_line(escaped)
+
+
+def _latex(text: str) -> str:
+    return _one_line(text).translate(_LATEX)
+
+
+def _one_line(text: str) -> str:
+    """Turn what ends a line, or cannot be printed, into spaces."""
+    return " ".join("".join(character if character.isprintable() else " " for character in text).split())
 
 
 def _write_csv(path: Path, table: pd.DataFrame) -> None:

@@ -20,6 +20,7 @@ PAPER_SETTINGS = {
     "training.learning_rate_after_drop": ("learning rate then", 1e-4),
 }
 """What the supplement says of network and training: words and value by a result's setting."""
+PAPER_DATASET = "cityscapes"
 PAPER_REPEATS = 20
 PAPER_WINDOWS = 500
 """One for each sequence of Cityscapes' validation set."""

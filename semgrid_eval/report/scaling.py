@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from semgrid_eval.report.changes import flat
-from semgrid_eval.report.paper import PAPER_REPEATS, PAPER_SETTINGS, PAPER_WINDOWS, paper_table
+from semgrid_eval.report.paper import PAPER_DATASET, PAPER_REPEATS, PAPER_SETTINGS, PAPER_WINDOWS, paper_table
 from semgrid_eval.report.reading import Row, Run
 
 
@@ -16,6 +16,8 @@ def scaling(run: Run) -> str:
     found = [_difference(text, _values(trained, key), theirs) for key, (text, theirs) in PAPER_SETTINGS.items()]
     found.append(_difference("repeats", {len(row.results) for row in trained}, PAPER_REPEATS))
     found.append(_difference("scored windows", {row.windows for row in rows}, PAPER_WINDOWS))
+    sources = sorted({log.dataset for log in run.record.logs} - {PAPER_DATASET})
+    found.append(f"data {' and '.join(sources)} instead of Cityscapes" if sources else "")
     told = [text for text in found if text]
     if not told:
         return "Trained as the paper's supplement says."

@@ -1,6 +1,9 @@
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
+from support.fake_run import HOSTILE
 
 from semgrid_eval.files import read_json
 from semgrid_eval.report.estimates import COLUMNS, score_rows
@@ -22,10 +25,21 @@ def test_markdown_has_a_line_for_each_row(scores):
 
 
 def test_markdown_and_latex_escape_names(scores):
-    odd = {"a|b_c & 5%\n$": scores["BL-DC"]}
-    assert "| a\\|b\\_c & 5% $ |" in markdown_table(odd)
-    assert r"a|b\_c \& 5\%" in latex_table(odd)
+    odd = {"a|b_c & 5%\n$x$": scores["BL-DC"]}
+    assert r"| a\|b\_c \& 5% \$x\$ |" in markdown_table(odd)
+    assert r"a\textbar{}b\_c \& 5\% \$x\$ &" in latex_table(odd)
     assert latex_table(odd).splitlines()[-1] == r"\end{tabular}"
+
+
+@pytest.mark.parametrize("name", [*HOSTILE, "[2pt] first", "* star", "\x1b[0m", "&lt;", "~~gone~~", "\u9053\u8def"])
+def test_a_name_stays_one_cell_of_one_line(scores, name):
+    tables = markdown_table({name: scores["BL-DC"]}), latex_table({name: scores["BL-DC"]})
+    plain = markdown_table({"x": scores["BL-DC"]}), latex_table({"x": scores["BL-DC"]})
+    assert [table.count("\n") for table in tables] == [table.count("\n") for table in plain]
+    markdown, latex = (table.splitlines()[at] for table, at in zip(tables, (2, 4), strict=True))
+    assert re.sub(r"\\.", "", markdown).count("|") == plain[0].splitlines()[2].count("|")
+    left = re.sub(r"\\(?:text\w+\{\}|.)|\{\[\}|\{\*\}", "", latex.split(" & ")[0])
+    assert not set(left) & set('&%$#_{}~^\\<>|"[*')
 
 
 def test_the_summary_has_every_row_and_score(page, scores):
@@ -41,6 +55,33 @@ def test_the_record_for_machines_has_scores_differences_and_failures(page):
     assert set(record["rows"]["ED-DC"]["differences"]) == set(COLUMNS)
     assert [failure["name"] for failure in record["failures"]] == ["ED-NT", "logs/town_broken.mcap"]
     assert record["runs"][0]["record"]["logs"][0]["digest"]
+
+
+def test_every_result_is_there_for_machines_with_its_cost_and_windows(page):
+    rows = read_json(page.parent / "report.json")["rows"]
+    results = rows["ED-DC"]["results"]
+    assert [result["seed"] for result in results] == [0, 1, 2]
+    assert results[0]["train_seconds"] == 80.0
+    assert results[0]["config"]["model"] == "ED"
+    windows = pd.read_csv(page.parent / "windows.csv").set_index("window_set")
+    assert len(windows.loc[results[0]["windows_id"]]) == results[0]["window_count"] == 16
+    assert rows["ED-NT"]["failure"] == "the loss became not a number in epoch 3"
+
+
+def test_the_times_of_inputs_stand_beside_each_window(page):
+    windows = pd.read_csv(page.parent / "windows.csv", dtype={"input_stamps_ns": str})
+    older, newest = np.array([text.split() for text in windows.input_stamps_ns], np.int64).T
+    assert (older < newest).all()
+    assert (newest < windows.target_stamp_ns).all()
+
+
+def test_training_histories_are_one_table(page):
+    table = pd.read_csv(page.parent / "training.csv")
+    assert table.groupby(["row", "seed"]).size().to_dict() == {
+        **{("ED-DC", seed): 6 for seed in range(3)},
+        **{("ED-Sp2", seed): 6 for seed in range(2)},
+    }
+    assert {"epoch", "loss", "validation_loss"} <= set(table.columns)
 
 
 def test_findings_and_regions_are_there_for_machines(page):

@@ -145,7 +145,13 @@ class _Maker:
     def __init__(self, run: Path, names: list[str], windows: int, truth: bool) -> None:
         self.run, self.names = run, names
         self.records = tuple(
-            results.WindowRecord(recording=n, log=_log(n), target_frame=20 + k, target_stamp_ns=(20 + k) * FRAME_NS)
+            results.WindowRecord(
+                recording=n,
+                log=_log(n),
+                target_frame=20 + k,
+                target_stamp_ns=(20 + k) * FRAME_NS,
+                input_stamps_ns=((10 + k) * FRAME_NS, (15 + k) * FRAME_NS),
+            )
             for n in names
             for k in range(windows)
         )
