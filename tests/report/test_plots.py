@@ -68,11 +68,14 @@ def test_a_history_with_other_columns_or_gaps_is_no_obstacle(rows):
     assert len(plots.training_plots([row])) == 1
 
 
-def test_several_horizons_give_a_curve(tmp_path):
+def test_several_horizons_give_a_curve_over_steps_and_seconds(tmp_path):
     steps = [FakeRow("DC", "ED", 0.1, 1), FakeRow("PH1", "ED", 0.2, 1, horizon_steps=2)]
     run = make_fake_run(tmp_path / "run", rows=tuple(steps), recordings=2, windows=1)
     scores = score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=2)
-    assert [plot.name for plot in plots.horizon_plots(scores)] == ["horizon"]
+    (plot,) = plots.horizon_plots(scores)
+    assert plot.name == "horizon"
+    assert plot.source == "summary.csv"
+    assert "0.29 s" in _texts(plot.svg)  # the time from the newest input to the target
 
 
 def test_names_in_any_script_are_drawn(rows, scores):

@@ -1,0 +1,55 @@
+import shlex
+
+import pytest
+import yaml
+
+from semgrid_eval.report.provenance import command_table, duration, matrix_file, matrix_text, row_command
+from semgrid_eval.report.reading import load_runs
+from semgrid_eval.runs.matrix import load_matrix
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        ("semgrid-eval run paper --logs L --out R", "semgrid-eval run paper --logs L --out R --row ED-DC"),
+        ("semgrid-eval run paper --row BL-DC --logs L --out R", "semgrid-eval run paper --logs L --out R --row ED-DC"),
+        ("semgrid-eval run paper --row=a --row b --logs L", "semgrid-eval run paper --logs L --row ED-DC"),
+        ("semgrid-eval run 'my matrix.yaml' --logs L", "semgrid-eval run 'my matrix.yaml' --logs L --row ED-DC"),
+        ("semgrid-eval demo", "semgrid-eval run matrix.yaml --logs LOGS --out RUN --row ED-DC"),
+        ("semgrid-eval run 'unclosed", "semgrid-eval run matrix.yaml --logs LOGS --out RUN --row ED-DC"),
+    ],
+)
+def test_a_rows_command_is_the_runs_own_narrowed_to_it(command, expected):
+    assert row_command(command, "ED-DC", "matrix.yaml") == expected
+
+
+def test_a_shell_reads_a_name_as_one_word():
+    name = 'it\'s $HOME; rm -rf "x" `y`\n'
+    assert shlex.split(row_command("semgrid-eval run paper --logs L", name, "matrix.yaml"))[-2:] == ["--row", name]
+
+
+def test_every_row_has_its_command_and_says_what_became_of_it(run):
+    lines = {body[0].header: body[0].cells for body in command_table(load_runs([run])).bodies}
+    assert lines["ED-DC"][1].text == "3 seeds"
+    assert lines["BL-DC"][1].text == "no training"
+    assert lines["ED-NT"][1].text == "failed"
+    assert lines["ED-NT"][2].text == "semgrid-eval run smoke --logs logs --out run --row ED-NT"
+
+
+@pytest.mark.parametrize("preset", ["paper-cpu", "sensitivity"])
+def test_the_matrix_beside_the_page_means_the_same_as_the_one_that_was_run(run, preset, tmp_path):
+    (found,) = load_runs([run])
+    matrix = load_matrix(preset)
+    object.__setattr__(found, "record", found.record.model_copy(update={"matrix": matrix.model_dump(mode="json")}))
+    path = tmp_path / matrix_file(found, [found])
+    path.write_text(matrix_text(found))
+    assert load_matrix(str(path)) == matrix
+
+
+def test_the_matrix_lies_beside_the_page(page):
+    assert yaml.safe_load((page.parent / "matrix.yaml").read_text())["training"] == {"epochs": 6, "batch": 8}
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(9.94, "9.9 s"), (312.5, "5 min 12 s"), (7260, "2 h 1 min")])
+def test_durations_are_short(seconds, text):
+    assert duration(seconds) == text
