@@ -5,8 +5,10 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.frames.synthetic import motion
@@ -99,13 +101,18 @@ def _moments(plan: RecordingPlan) -> Iterator[Moment]:
     camera = Camera(cityscapes_camera(plan.width_px, plan.height_px), plan.width_px, plan.height_px)
     rig = Rig(camera, plan.stereo, errors)
     stage = Stage(town, rig.cameras, draw_sunlight(light), path.at(float(times_s[0]))[:2])
-    for time_s, (speed_mps, yaw_rate_radps) in zip(times_s, reported, strict=True):
+    for time_s, told in zip(times_s, _rounded(reported), strict=True):
         stamp_ns = round(float(time_s) * 1e9)
-        pose = Pose(stamp_ns, *path.at(float(time_s))[:3])
+        pose = Pose(stamp_ns, *_rounded(np.array(path.at(float(time_s))[:3])))
         others = stage.others(float(time_s), pose, plan.drive.actor)
         frame = rig.frame(stamp_ns, stage.pictures(others, float(time_s), pose))
-        sample = MotionSample(stamp_ns, float(speed_mps), float(yaw_rate_radps))
+        sample = MotionSample(stamp_ns, *told)
         yield Moment(stamp_ns, {CAMERA_NAME: frame}, (sample,), pose, (*_actors(others), *_actors(stage.parked)))
+
+
+def _rounded(values: NDArray[np.float64]) -> Any:  # noqa: ANN401 - floats, in lists as deep as the array
+    """Round metres, radians and their rates to millionths: processors differ in the last bits of a sine."""
+    return (np.round(values, 6) + 0.0).tolist()  # no -0.0
 
 
 def _actors(group: Snapshot) -> list[Actor]:
@@ -113,7 +120,9 @@ def _actors(group: Snapshot) -> list[Actor]:
         [group.centre_m, group.yaw_rad, heights_m(group.actor, group.type_index), group.velocity_mps]
     )
     found = []
-    for actor_id, type_index, values in zip(actor_ids(group).tolist(), group.type_index, columns.tolist(), strict=True):
+    for actor_id, type_index, values in zip(
+        actor_ids(group).tolist(), group.type_index, _rounded(columns), strict=True
+    ):
         user = ROAD_USERS[type_index]
         x_m, y_m, yaw_rad, height_m, velocity_x, velocity_y = values
         size_m = (user.length_m, user.width_m, height_m)

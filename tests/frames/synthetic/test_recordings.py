@@ -175,6 +175,15 @@ def test_the_same_seed_gives_the_same_bytes(plans, moments):
     assert render_recording(plans[0]).source_digest == plans[0].digest
 
 
+def test_numbers_are_told_to_a_millionth_on_which_processors_agree(moments):
+    for moment in moments[::10]:
+        actors = [value for actor in moment.actors for value in (actor.x_m, actor.y_m, actor.yaw_rad, actor.height_m)]
+        rates = [moment.motion[0].speed_mps, moment.motion[0].yaw_rate_radps, moment.actors[0].velocity_x_mps]
+        for value in (moment.pose.x_m, moment.pose.y_m, moment.pose.yaw_rad, *actors, *rates):
+            assert value == round(value, 6)
+            assert math.copysign(1.0, value) > 0 or value != 0.0
+
+
 def test_plans_do_not_depend_on_workers(plans):
     config = SyntheticConfig(**SMALL, width=128, height=64)
     assert plan_recordings(config, town_cache(), silent, workers=2) == plans
@@ -231,9 +240,7 @@ def test_validation_may_have_another_share_of_the_towns_than_of_the_recordings()
 
 def test_without_embree_the_extra_is_named_before_towns_are_simulated(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "embreex", None)
-    with pytest.raises(
-        MissingExtraError, match=r"embreex is not installed; .*semgrid-eval\[synthetic\]"
-    ):
+    with pytest.raises(MissingExtraError, match=r"embreex is not installed; .*semgrid-eval\[synthetic\]"):
         plan_recordings(SyntheticConfig(**SMALL), tmp_path, silent)
     assert list(tmp_path.iterdir()) == []
 
