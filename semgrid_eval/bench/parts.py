@@ -1,5 +1,6 @@
 """The parts of the benchmark of speed, and what it is run on."""
 
+import os
 import platform
 import tempfile
 from collections.abc import Sequence
@@ -51,8 +52,13 @@ def measure(
 
 
 def conditions(device: torch.device) -> dict[str, str]:
-    """Return what the numbers hold for: processor, cores, threads, device and versions."""
-    return {"processor": _processor(), **machine(device), **versions()}
+    """Return what the numbers hold for: processor, cores, threads, device, other work at this moment and versions."""
+    return {"processor": _processor(), "load": f"{load():.1f}", **machine(device), **versions()}
+
+
+def load() -> float:
+    """Return how many processes wanted to run during the last minute; 0 where the system does not say."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
 
 
 def _processor() -> str:

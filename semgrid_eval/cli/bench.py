@@ -6,9 +6,11 @@ from pathlib import Path
 import click
 
 from semgrid_eval.bench.measurement import FULL, QUICK, Measurement
-from semgrid_eval.cli.console import progress
+from semgrid_eval.cli.console import progress, say
+from semgrid_eval.executors import available_cores
 from semgrid_eval.files import write_json
 
+_BUSY = 0.5  # load for each core above which speeds suffer
 _SHOWN = ("processor", "cpu_cores", "torch_threads", "device", "gpu", "python", "torch", "numpy", "semgrid-eval")
 
 
@@ -26,14 +28,16 @@ def command(only: str | None, device: str, json_file: Path | None, *, quick: boo
     log; grids: making them; training: of networks, against a textbook's float32 loop and against the product of large
     matrices; prediction: with networks, and scoring. Where something is promised, that stands beside the number.
     """
-    from semgrid_eval.bench.parts import PARTS, conditions, measure
+    from semgrid_eval.bench.parts import PARTS, conditions, load, measure
     from semgrid_eval.models.device import choose_device
 
     parts = PARTS if only is None else [part.strip() for part in only.split(",")]
     chosen = choose_device(device)
+    here = conditions(chosen)
+    if load() > _BUSY * available_cores():
+        say(f"Warning: this machine has other work (load {here['load']}); measured speeds are lower than its own")
     with progress("measure") as watch:
         found = measure(parts, QUICK if quick else FULL, device=chosen, progress=watch)
-    here = conditions(chosen)
     if json_file:
         told = [{"part": part, **asdict(row)} for part, rows in found.items() for row in rows]
         write_json(json_file, {"conditions": here, "quick": quick, "measurements": told})

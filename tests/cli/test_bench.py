@@ -1,4 +1,5 @@
 import json
+import os
 import shlex
 
 import pytest
@@ -49,7 +50,17 @@ def test_the_example_measures_the_parts_that_it_names(tiny):
     assert "f 2, against the textbook" in done.stdout
 
 
-def test_an_unknown_part_is_one_line(capsys):
+def test_a_busy_machine_is_a_warning(tiny, monkeypatch):
+    monkeypatch.setattr(os, "getloadavg", lambda: (99.0, 0.0, 0.0))
+    done = CliRunner().invoke(cli, ["bench", "--quick", "--only", "prediction"])
+    assert done.stderr.startswith("Warning: this machine has other work (load 99.0)")
+    monkeypatch.setattr(os, "getloadavg", lambda: (0.1, 0.0, 0.0))
+    done = CliRunner().invoke(cli, ["bench", "--quick", "--only", "prediction"])
+    assert "Warning" not in done.stderr
+
+
+def test_an_unknown_part_is_one_line(monkeypatch, capsys):
+    monkeypatch.setattr(os, "getloadavg", lambda: (0.1, 0.0, 0.0))
     with pytest.raises(SystemExit) as stopped:
         main(["bench", "--only", "render,tranining"])
     assert stopped.value.code == 1
