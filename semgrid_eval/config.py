@@ -52,7 +52,8 @@ def parse_config(model: type[C], value: object, *, path: Path | str | None = Non
     """Validate a plain value against a config class.
 
     Raises:
-        ConfigError: names the place of the first fault, the value found there and, for a key, the allowed ones.
+        ConfigError: names the place of the first fault, unknown keys before others, the value found there and, for a
+            key, the allowed ones.
     """
     try:
         # JSON is the strict border: it allows lists for tuples and names for enums, and nothing else that YAML guesses.
@@ -80,7 +81,9 @@ def load_yaml(path: Path) -> Any:  # noqa: ANN401 - anything that YAML can hold
 
 
 def _first_fault(model: type[BaseModel], error: ValidationError, path: Path | str | None) -> ConfigError:
-    fault = error.errors(include_url=False)[0]
+    faults = error.errors(include_url=False)
+    # A misspelt key is also a missing one, and says more.
+    fault = next((each for each in faults if each["type"] == "extra_forbidden"), faults[0])
     place = ".".join(str(part) for part in fault["loc"]) or "(top level)"
     message = fault["msg"].removeprefix("Value error, ")
     if fault["type"] == "extra_forbidden":

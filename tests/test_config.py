@@ -22,6 +22,7 @@ class Outer(Config):
         ({"inner": {"size": "2"}}, r"m.yaml: inner.size: .*integer.* \(found '2'\)"),
         ({"inner": {"size": 2.5}}, "m.yaml: inner.size"),
         ({"names": "abc"}, "m.yaml: names"),
+        ({"names": "abc", "iner": {}}, "m.yaml: iner: unknown key"),
         ([1, 2], r"m.yaml: \(top level\)"),
         ({"inner": {"ratio": float("nan")}}, "m.yaml"),
     ],

@@ -1,4 +1,5 @@
 import shlex
+from dataclasses import replace
 
 import pytest
 import yaml
@@ -72,6 +73,51 @@ def test_dry_run_tells_updates_and_minutes_and_trains_nothing(here):
     assert call(*arguments, "--dry-run").stdout.count("\tdone") == 2
 
 
+BAD_MODELS = """
+import torch
+
+class Small:
+    def __call__(self, batch):
+        return torch.zeros(len(batch.target), 10, 4, 4)
+
+class NotANumber:
+    def __call__(self, batch):
+        return torch.full((len(batch.target), 10, 128, 128), torch.nan)
+"""
+
+
+def unlabelled(recording):
+    def moments():
+        for moment in recording.moments():
+            cameras = {name: replace(frame, label_png=None) for name, frame in moment.cameras.items()}
+            yield replace(moment, cameras=cameras)
+
+    return replace(recording, moments=moments)
+
+
+def test_whatever_fails_is_one_line_each_and_the_others_go_on(here, tmp_path_factory):
+    logs = tmp_path_factory.mktemp("unlabelled")
+    write_log(street(1, frames=9).recording("good", "val"), logs / "good.mcap")
+    write_log(unlabelled(street(2, frames=9).recording("bare", "val")), logs / "bare.mcap")
+    (here / "bad.py").write_text(BAD_MODELS)
+    rows = [
+        {"name": "small", "model": "bad.py:Small"},
+        {"name": "nan", "model": "bad.py:NotANumber"},
+        {"name": "far", "model": "newest", "window": {"horizon_steps": 5, "target_frame": 18}},
+        {"name": "BL-DC", "model": "newest"},
+    ]
+    result = call("run", matrix(here, rows), "--logs", str(logs), "--out", "run", "--workers", "1")
+    assert result.return_value == 1
+    assert [line for line in result.stderr.splitlines() if line.startswith("Error")] == [
+        "Error: row small: bad.py:Small: gave shape (1, 10, 4, 4) where (1, 10, 128, 128) is needed",
+        "Error: row nan: bad.py:NotANumber: gave scores that are NaN or infinite",
+        "Error: row far: a window needs 19 frames, and the longest of 1 recordings has 9",
+        "Error: bare.mcap: frame at 1000000000000000000 ns: has no label image; "
+        "add labels to the log (convert cityscapes --labels DIR)",
+    ]
+    assert [row.name for row in read_run(here / "run").rows if row.results] == ["BL-DC"]
+
+
 def test_a_failing_row_is_one_line_and_exit_code_1(here):
     rows = [{"name": "BL-DC", "model": "newest"}, {"name": "BL-x", "model": "newest", "validation_split": "nowhere"}]
     result = call("run", matrix(here, rows), "--logs", "logs", "--out", "run")
@@ -86,6 +132,11 @@ def test_a_failing_row_is_one_line_and_exit_code_1(here):
     ("arguments", "message"),
     [
         (["run", "m.yaml", "--logs", "logs", "--out", "run"], "m.yaml: is neither a file nor a preset"),
+        (["run", "misspelt.yaml", "--logs", "logs", "--out", "run"], "row 'a': modle: unknown key; allowed here:"),
+        (
+            ["run", "no_class.yaml", "--logs", "logs", "--out", "run"],
+            "grid: class_map.car: 'rood' is not one of unknown",
+        ),
         (["run", "smoke", "--logs", "logs", "--out", "run", "--device", "tpu"], "device: no device 'tpu' here"),
         (["run", "smoke", "--logs", "empty", "--out", "run"], "empty: holds no .mcap log"),
         (["run", "smoke", "--logs", "logs", "--out", "file/run"], "cannot be written"),
@@ -96,6 +147,8 @@ def test_a_users_mistake_is_one_line_without_a_traceback(here, capsys, arguments
     (here / "empty").mkdir()
     (here / "file").write_text("")
     (here / "grid.yaml").write_text("morfology: off")
+    (here / "misspelt.yaml").write_text("rows: [{name: a, modle: ed}]")
+    (here / "no_class.yaml").write_text("rows: [{name: a, model: ed, grid: {class_map: {car: rood}}}]")
     with pytest.raises(SystemExit) as stop:
         main(arguments)
     assert stop.value.code == 1

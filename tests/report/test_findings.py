@@ -152,6 +152,34 @@ def test_times_of_one_pair_or_of_pairs_that_disagree_decide_nothing():
     assert _findings(*pair)["wider-better"].verdict is NOT_RUN
 
 
+ROWS = [row.name for name in ("paper-cpu", "architecture") for row in load_matrix(name).rows]
+
+
+def _rows_for(claim, wanted):
+    """Make the claim's rows: scores and times fall from row to row, rise or waver; leads compared with are none."""
+    names = list(dict.fromkeys(name for check in claim.checks for pair in check.pairs for name in pair))
+    descending = [70 - 4 * place for place in range(len(names))]
+    level = [50] * len(names)
+    close = claim.checks[0].rule == "close"
+    values = {HOLDS: level if close else descending, FAILS: descending[::-1], OPEN: [MIXED, *level[1:]]}[wanted]
+    times = [9.0, 3.0, 3.0, 9.0] * len(names) if wanted is OPEN else values
+    others = {name for check in claim.checks for name in check.over or ()} - set(names)
+    for name, value, ms in [*zip(names, values, times, strict=False), *((name, 50, 1.0) for name in others)]:
+        hits = _hits(value, small=value)
+        yield counted_row(name, hits, near={"moving": hits, "standing": hits}, window_ms=ms)
+
+
+@pytest.mark.parametrize("wanted", [HOLDS, FAILS, OPEN])
+@pytest.mark.parametrize("claim", claims(ROWS), ids=lambda claim: claim.name)
+def test_every_claim_can_hold_fail_and_stay_undecided(claim, wanted):
+    run = Run(Path(), "", None, tuple(_rows_for(claim, wanted)))
+    builds = [row.name for row in run.rows if row.name.startswith("ED-d")]
+    scores = score_rows(run.rows, np.random.default_rng(0), draws=100)
+    found = {each.claim.name: each for each in find([run], scores, score_regions(run.rows, 0))}[claim.name]
+    assert found.claim.checks == next(c.checks for c in claims(builds or ROWS) if c.name == claim.name)
+    assert found.verdict is wanted, [(o.check.text, o.verdict, o.difference) for o in found.outcomes]
+
+
 @given(st.floats(-1, 1), st.floats(0, 1))
 def test_no_interval_both_holds_and_fails(low, width):
     difference = Estimate(low + width / 2, low, low + width)
@@ -172,9 +200,8 @@ def test_every_claim_has_its_own_name_and_says_its_margin():
 
 
 def test_presets_name_every_row_that_a_claim_needs():
-    rows = [row.name for name in ("paper-cpu", "architecture") for row in load_matrix(name).rows]
-    needed = {name for claim in claims(rows) for check in claim.checks for name in check.weights}
-    assert needed <= set(rows)
+    needed = {name for claim in claims(ROWS) for check in claim.checks for name in check.weights}
+    assert needed <= set(ROWS)
 
 
 def test_tables_and_records_tell_the_same():

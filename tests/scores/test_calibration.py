@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from sklearn.calibration import calibration_curve
 
 from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.scores.calibration import certainty_counts, expected_calibration_error, reliability
@@ -53,6 +54,17 @@ def test_bins_and_error_equal_going_through_the_cells(counts, bins):
     assert expected_calibration_error(counts, bins) == (
         pytest.approx(error, abs=1e-12) if cells else pytest.approx(math.nan, nan_ok=True)
     )
+
+
+def test_bins_equal_scikit_learns_where_no_certainty_lies_on_an_edge():
+    counts = np.random.default_rng(2).integers(0, 5, (256, 2))
+    certainty, right = np.repeat(np.indices(counts.shape).reshape(2, -1), counts.ravel(), axis=1)
+    expected_right, expected_certainty = calibration_curve(right, certainty / 255, n_bins=7)
+    table = reliability(counts, bins=7)
+    np.testing.assert_allclose(table.right, expected_right)
+    np.testing.assert_allclose(table.certainty, expected_certainty)
+    gaps = np.abs(expected_right - expected_certainty)
+    assert expected_calibration_error(counts, bins=7) == pytest.approx(gaps @ table.cells / counts.sum())
 
 
 def test_who_is_always_certain_errs_as_often_as_wrong():

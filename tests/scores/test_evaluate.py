@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import torch
 from support.recordings import random_recording
 
 from semgrid_eval.classes import CLASS_COUNT
@@ -38,6 +39,16 @@ def test_regions_equal_counting_cell_by_cell(batch):
     np.testing.assert_array_equal(moving, slow_counts(kept, scored.prediction, lambda flags: flags in (2, 3)))
     np.testing.assert_array_equal(standing, slow_counts(kept, scored.prediction, lambda flags: flags == 1))
     assert [bool(counts.sum()) for counts in moving] == [True, True, False, True, True]  # number 2 has no truth
+
+
+def test_class_and_certainty_are_those_of_the_largest_score_in_each_cell():
+    scores = torch.rand(3, CLASS_COUNT, 16, 16, generator=torch.Generator().manual_seed(0)) * 1.2
+    windows = windows_of(*(random_recording(seed) for seed in range(3)))
+    scored = evaluate(lambda batch: scores, windows)
+    for n, row, column in np.ndindex(scored.prediction.shape):
+        cell = scores[n, :, row, column].tolist()
+        assert scored.prediction[n, row, column] == cell.index(max(cell))
+        assert scored.certainty[n, row, column] == round(min(max(cell), 1.0) * 255)
 
 
 def test_without_the_truth_there_are_no_regions():
