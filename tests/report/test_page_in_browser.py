@@ -8,6 +8,8 @@ import time
 
 import pytest
 
+from semgrid_eval.classes import MASK_COLOUR, class_palette
+
 webdriver = pytest.importorskip("selenium.webdriver", reason="Selenium is not installed (pip install selenium)")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
@@ -82,11 +84,27 @@ def test_tables_and_pictures_are_shown_without_error_or_request(opened, page):
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-def test_nothing_scrolls_sideways(browser, page, width):
-    _open(browser, page, width=width)
-    script = "return [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+@pytest.mark.parametrize("name", ["page", "side_by_side", "troubled"])
+def test_nothing_scrolls_sideways(browser, request, name, width):
+    _open(browser, request.getfixturevalue(name), width=width)
+    script = """
+    document.querySelectorAll('details').forEach(part => { part.open = true; });
+    return [document.documentElement.scrollWidth, document.documentElement.clientWidth];
+    """
     wide, shown = browser.execute_script(script)
     assert wide <= shown <= width
+    assert browser.get_log("browser") == []
+
+
+def test_a_wide_figure_is_reached_by_keyboard_on_a_phone(browser, page):
+    _open(browser, page, width=390)
+    script = """
+    return [...document.querySelectorAll('.canvas')].map(each =>
+      [each.scrollWidth > each.clientWidth, each.tabIndex === 0 && each.ariaLabel.length > 20]);
+    """
+    canvases = browser.execute_script(script)
+    assert any(scrolls for scrolls, _ in canvases)
+    assert all(scrolls == reached for scrolls, reached in canvases)
 
 
 def test_a_click_sorts_and_another_turns_the_order(opened):
@@ -132,6 +150,66 @@ def test_a_table_can_be_saved_as_csv(opened):
     assert 0 < float(lines[1][1]) < 1
 
 
+def test_a_tap_on_a_number_tells_what_stands_behind_it(opened):
+    script = """
+    const cell = document.querySelector('#table-categories tbody td');
+    cell.click();
+    return [cell.title, document.querySelector('[data-table=categories] .tip').value];
+    """
+    title, told = opened.execute_script(script)
+    assert told == title
+    for words in ("16 windows", "target cells", "95% interval"):
+        assert words in told
+
+
+def test_a_command_is_copied_or_at_least_selected(opened):
+    script = """
+    document.getElementById('commands').open = true;
+    document.querySelector('#table-commands .copy').click();
+    return getSelection().toString();
+    """
+    assert opened.execute_script(script) == "semgrid-eval run smoke --logs logs --out run --row BL-DC"
+
+
+COLOURS = """
+const done = arguments[0], picture = document.querySelector('#examples img[alt^="Prediction of"]');
+picture.loading = 'eager';
+picture.decode().then(() => {
+  const canvas = Object.assign(document.createElement('canvas'), {width: 128, height: 128});
+  const context = canvas.getContext('2d');
+  context.drawImage(picture, 0, 0);
+  const pixels = context.getImageData(0, 0, 128, 128).data, found = new Set();
+  for (let i = 0; i < pixels.length; i += 4) found.add([...pixels.slice(i, i + 3)].join());
+  const road = [...document.querySelectorAll('#examples .legend li')].find(each => each.textContent.trim() === 'road');
+  done([[...found], getComputedStyle(road.querySelector('.swatch')).backgroundColor, picture.src]);
+});
+"""
+
+
+def test_a_key_switches_pictures_and_legend_to_the_papers_colours_and_back(opened):
+    def colours():
+        found, road, source = opened.execute_async_script(COLOURS)
+        return {tuple(map(int, text.split(","))) for text in found}, road, source
+
+    def press():
+        opened.execute_script("document.querySelector('.colours').focus()")
+        for kind in ("keyDown", "keyUp"):
+            key = {"type": kind, "key": "Enter", "code": "Enter", "text": "\r", "windowsVirtualKeyCode": 13}
+            opened.execute_cdp_cmd("Input.dispatchKeyEvent", key)
+        return opened.execute_script("return document.querySelector('.colours').getAttribute('aria-pressed')")
+
+    safe = colours()
+    assert press() == "true"
+    paper = colours()
+    assert press() == "false"
+    assert colours() == safe
+    for (found, road, _), palette in ((safe, class_palette(safe=True)), (paper, class_palette())):
+        allowed = {tuple(colour) for colour in palette.tolist()} | {MASK_COLOUR}
+        assert len(found) > 2
+        assert found <= allowed
+        assert road == "rgb({}, {}, {})".format(*palette[1].tolist())
+
+
 def test_the_slider_shows_the_steps_of_a_window(opened):
     script = """
     const flip = document.querySelector('.flip'), slider = flip.querySelector('input');
@@ -167,19 +245,35 @@ def axe(tmp_path_factory):
     return (folder / "node_modules/axe-core/axe.min.js").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing_serious(browser, page, axe, scheme):
+CONTRAST = "color-contrast"
+"""The one rule that depends on the theme and not on the names or rows of a run."""
+THIN = "document.querySelectorAll('tbody:nth-of-type(n+4), .window:nth-of-type(n+3)').forEach(part => part.remove())"
+"""Leaves three rows of each table and two windows of each group: the others are built alike."""
+
+
+@pytest.mark.parametrize(
+    ("name", "scheme", "options"),
+    [
+        ("page", "light", {}),
+        ("page", "dark", {"runOnly": {"type": "rule", "values": [CONTRAST]}}),
+        ("side_by_side", "light", {"rules": {CONTRAST: {"enabled": False}}}),
+        ("troubled", "light", {"rules": {CONTRAST: {"enabled": False}}}),
+    ],
+)
+def test_axe_finds_nothing_serious(browser, request, axe, name, scheme, options):
     features = [{"name": "prefers-color-scheme", "value": scheme}]
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-    _open(browser, page, width=1280)
+    _open(browser, request.getfixturevalue(name), width=1280)
     browser.execute_script("document.querySelectorAll('details').forEach(part => { part.open = true; })")
+    if name != "page":
+        browser.execute_script(THIN)
     browser.execute_script(axe)
     script = """
-    const done = arguments[0];
-    axe.run(document, {resultTypes: ['violations']}).then(found =>
+    const [options, done] = arguments;
+    axe.run(document, {...options, resultTypes: ['violations']}).then(found =>
       done(found.violations.map(each => [each.impact, each.id, each.nodes[0].html.slice(0, 200)])));
     """
-    assert browser.execute_async_script(script) == []
+    assert browser.execute_async_script(script, options) == []
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
