@@ -46,10 +46,10 @@ class TownKind:
     hedges: float
     fences: float
     cars: float = 13.0
-    trucks: float = 2.0
-    buses: float = 1.5
-    bicycles: float = 11.0
-    persons: float = 50.0
+    trucks: float = 3.0
+    buses: float = 2.5
+    bicycles: float = 19.0
+    persons: float = 90.0
 
 
 KINDS = (
@@ -91,7 +91,7 @@ KINDS = (
         hedges=0.35,
         fences=0.30,
         cars=15.0,
-        buses=2.0,
+        buses=3.0,
     ),
     TownKind(
         "suburb",
@@ -111,7 +111,7 @@ KINDS = (
         tree_rows=0.35,
         hedges=0.55,
         fences=0.35,
-        persons=38.0,
+        persons=65.0,
     ),
     TownKind(
         "arterial",
@@ -132,7 +132,7 @@ KINDS = (
         hedges=0.40,
         fences=0.40,
         cars=16.0,
-        trucks=3.0,
-        persons=36.0,
+        trucks=4.5,
+        persons=65.0,
     ),
 )

@@ -7,9 +7,33 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.classes import LABEL_ID
+
 FULL_WIDTH_PX = 2048
 _LABEL_WIDTH_PX = 512
-_LABEL_FIELDS_PX = (2.5, 2.5, 6.0, 4.0)  # smoothness of: displacement right, down; bad borders; confusion
+# Smoothness of: displacement right, down; bad borders; confusion; mistakes.
+_LABEL_FIELDS_PX = (2.5, 2.5, 6.0, 4.0, 7.0)
+_NEVER = 9.0  # standard deviations that no field reaches
+_MIDDLE_PX = 12.0  # disparity, of 2048, of 39 m: half way between near and far dropouts
+_MISTAKES = {
+    "road": (0.010, "sidewalk", "sidewalk"),
+    "sidewalk": (0.07, "road", "terrain"),
+    "building": (0.06, "vegetation", "wall"),
+    "wall": (0.30, "building", "vegetation"),
+    "fence": (0.30, "vegetation", "building"),
+    "pole": (0.10, "building", "vegetation"),
+    "traffic light": (0.10, "vegetation", "building"),
+    "traffic sign": (0.10, "building", "vegetation"),
+    "vegetation": (0.05, "building", "terrain"),
+    "terrain": (0.20, "sidewalk", "vegetation"),
+    "person": (0.03, "building", "rider"),
+    "rider": (0.10, "person", "bicycle"),
+    "car": (0.015, "truck", "building"),
+    "truck": (0.15, "car", "bus"),
+    "bus": (0.12, "truck", "building"),
+    "bicycle": (0.06, "person", "building"),
+}
+"""Share of a label's area that networks take for another one, and for which two, one half each."""
 
 
 @dataclass(frozen=True)
@@ -21,22 +45,30 @@ class DisparityNoise:
         slow_px: likewise smooth, but carried from frame to frame with `persistence`.
         white_px: of each pixel for itself.
         correlation: standard deviation of the smoothing kernel as a share of the width.
-        persistence: share of the slow error that the next frame keeps.
-        dropout: share of the image in patches without disparity.
+        persistence: share of the slow error, and of where mismatches are, that the next frame keeps.
+        mismatched: share of the image in patches that were matched to something else.
+        mismatch_px: standard deviation of the error there.
+        dropout: share of patches without disparity near the camera, and ...
+        far_dropout: ... at an infinite distance, where a matching window holds more borders.
+        dropout_persistence: share of where dropouts are that the next frame keeps.
         speckle: share of single pixels without disparity.
         fattened: share of the borders at which the foreground spreads over the background.
         sky: share of the sky that has a wrong, small disparity.
     """
 
-    correlated_px: float = 0.25
-    slow_px: float = 0.12
-    white_px: float = 0.40
+    correlated_px: float = 0.28
+    slow_px: float = 0.26
+    white_px: float = 0.25
     correlation: float = 0.012
     persistence: float = 0.9
-    dropout: float = 0.05
+    mismatched: float = 0.010
+    mismatch_px: float = 6.0
+    dropout: float = 0.04
+    far_dropout: float = 0.18
+    dropout_persistence: float = 0.7
     speckle: float = 0.015
     fattened: float = 0.6
-    sky: float = 0.04
+    sky: float = 0.45
 
 
 @dataclass(frozen=True)
@@ -49,7 +81,9 @@ class LabelNoise:
         bad_borders: share of the image in such patches.
         confused_px: how far the labels of a patch of confusion may be from their true place.
         confused: share of the image in such patches.
-        persistence: share of each error field that the next frame keeps; the rest flickers.
+        mistaken: factor on the shares of `_MISTAKES`, patches that get another label as a whole.
+        persistence: share of the borders' error fields that the next frame keeps; the rest flickers.
+        mistakes_persistence: likewise, of the patches with another label.
     """
 
     warp_px: float = 0.35
@@ -57,7 +91,9 @@ class LabelNoise:
     bad_borders: float = 0.10
     confused_px: float = 8.0
     confused: float = 0.004
+    mistaken: float = 0.5
     persistence: float = 0.7
+    mistakes_persistence: float = 0.9
 
 
 class DisparityErrors:
@@ -67,6 +103,8 @@ class DisparityErrors:
         self._noise = noise
         self._rng = rng
         self._slow: NDArray[np.float32] | None = None
+        self._mismatch: NDArray[np.float32] | None = None
+        self._dropout: NDArray[np.float32] | None = None
 
     def add(self, exact_px: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the next frame's disparity (H, W) with errors, in pixels of its own width."""
@@ -76,12 +114,28 @@ class DisparityErrors:
         seen = _fattened(exact_px, noise.fattened, rng)
         error = noise.correlated_px * _smooth_field(shape, sigma, rng) + noise.slow_px * self._slow
         error += noise.white_px * rng.standard_normal(shape, np.float32)
+        error += self._mismatch_px(shape)
         noisy = np.asarray(seen + error * np.float32(shape[1] / FULL_WIDTH_PX), np.float32)
-        lost = _smooth_field(shape, 0.006 * shape[1], rng) > _threshold(noise.dropout)
+        fresh = _smooth_field(shape, 0.006 * shape[1], rng)
+        self._dropout = _carried(self._dropout, fresh, noise.dropout_persistence)
+        lost = self._dropout > self._dropout_threshold(seen)
         lost |= rng.random(shape, np.float32) < noise.speckle
         noisy[lost | _is_occluded(seen) | (seen <= 0.0)] = 0.0
         _match_sky(noisy, exact_px, noise.sky, rng)
         return np.maximum(noisy, 0.0)
+
+    def _mismatch_px(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
+        """Return the error (H, W) of patches that were matched to something else, 0 around them."""
+        noise, sigma = self._noise, 0.008 * shape[1]
+        self._mismatch = _carried(self._mismatch, _smooth_field(shape, sigma, self._rng), noise.persistence)
+        error_px = np.float32(noise.mismatch_px) * _smooth_field(shape, 2.0 * sigma, self._rng)
+        return np.where(self._mismatch > _threshold(noise.mismatched), error_px, np.float32(0.0))
+
+    def _dropout_threshold(self, disparity_px: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return what a Gaussian field exceeds (H, W) on the share of dropouts at each pixel's range."""
+        near, far = _threshold(self._noise.dropout), _threshold(self._noise.far_dropout)
+        middle_px = np.float32(_MIDDLE_PX * disparity_px.shape[1] / FULL_WIDTH_PX)
+        return np.asarray(near + np.float32(far - near) * middle_px / (middle_px + disparity_px), np.float32)
 
 
 class LabelErrors:
@@ -91,21 +145,36 @@ class LabelErrors:
         self._noise = noise
         self._rng = rng
         self._fields: list[NDArray[np.float32] | None] = [None] * len(_LABEL_FIELDS_PX)
+        self._kept = (*[noise.persistence] * (len(_LABEL_FIELDS_PX) - 1), noise.mistakes_persistence)
+        self._mistakes = _mistake_tables(noise.mistaken)
 
     def add(self, exact: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return the next frame's labels (H, W) with errors."""
         noise, scale = self._noise, exact.shape[1] / _LABEL_WIDTH_PX
         fresh = [_smooth_field(exact.shape, sigma_px * scale, self._rng) for sigma_px in _LABEL_FIELDS_PX]
-        fields = [_carried(old, new, noise.persistence) for old, new in zip(self._fields, fresh, strict=True)]
+        fields = [_carried(*each) for each in zip(self._fields, fresh, self._kept, strict=True)]
         self._fields = list(fields)
-        right, down, border, confusion = fields
+        right, down, border, confusion, mistake = fields
         reach = np.full(exact.shape, noise.warp_px * scale, np.float32)
         reach[border > _threshold(noise.bad_borders)] = noise.border_px * scale
         reach[confusion > _threshold(noise.confused)] = noise.confused_px * scale
         rows, columns = np.indices(exact.shape, np.float32)
         places = (columns + reach * right, rows + reach * down)
         mode = cv2.BORDER_REPLICATE
-        return np.asarray(cv2.remap(exact, *places, cv2.INTER_NEAREST, borderMode=mode), np.uint8)
+        bent = np.asarray(cv2.remap(exact, *places, cv2.INTER_NEAREST, borderMode=mode), np.uint8)
+        limit, high, low = self._mistakes
+        rare = limit[bent]
+        return np.where(mistake > rare, high[bent], np.where(mistake < -rare, low[bent], bent))
+
+
+def _mistake_tables(factor: float) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return tables (256,) by label: beyond what value of a field it is mistaken, and for what above and below."""
+    limit, high = np.full(256, np.inf, np.float32), np.arange(256, dtype=np.uint8)
+    low = high.copy()
+    for name, (share, above, below) in _MISTAKES.items():
+        label = LABEL_ID[name]
+        limit[label], high[label], low[label] = _threshold(0.5 * factor * share), LABEL_ID[above], LABEL_ID[below]
+    return limit, high, low
 
 
 def _carried(old: NDArray[np.float32] | None, fresh: NDArray[np.float32], persistence: float) -> NDArray[np.float32]:
@@ -130,7 +199,7 @@ def _smooth_field(shape: tuple[int, ...], sigma: float, rng: np.random.Generator
 
 def _threshold(share: float) -> float:
     """Return the value that a Gaussian field exceeds on this share of its area."""
-    return NormalDist().inv_cdf(1.0 - share) if 0.0 < share < 1.0 else float("inf")
+    return NormalDist().inv_cdf(1.0 - share) if 0.0 < share < 1.0 else _NEVER
 
 
 def _fattened(disparity_px: NDArray[np.float32], share: float, rng: np.random.Generator) -> NDArray[np.float32]:

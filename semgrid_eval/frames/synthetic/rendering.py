@@ -24,7 +24,7 @@ from semgrid_eval.frames.synthetic.traffic import Snapshot
 from semgrid_eval.frames.types import Actor, Moment, MotionSample, Pose, Recording
 
 CAMERA_NAME = "front"
-RENDER_VERSION = 1
+RENDER_VERSION = 2
 """Counts changes to what a plan renders to; logs of another version are rendered anew."""
 STAMP_JITTER_S = 0.001
 

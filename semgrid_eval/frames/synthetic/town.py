@@ -17,7 +17,7 @@ from semgrid_eval.frames.synthetic.simulation import simulate_traffic
 from semgrid_eval.frames.synthetic.streets import lay_out_streets
 from semgrid_eval.frames.synthetic.traffic import Traffic
 
-TOWN_VERSION = 1
+TOWN_VERSION = 2
 """Counts changes to how towns are built; a town of another version is built anew."""
 _SPEC_FILE = "town.json"
 
