@@ -28,7 +28,7 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     type=click.Path(path_type=Path, file_okay=False),
     help="Trained networks (default: OUT/trainings); those of another run are used where they fit.",
 )
-@click.option("--row", "only", multiple=True, help="Only this row; may be given several times.")
+@click.option("--row", "only", multiple=True, help="Only this row, or rows like 'BL-*'; may be repeated.")
 @click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Rows trained at once.")
 @click.option(
@@ -77,7 +77,7 @@ def command(
     """
     from semgrid_eval.models.device import visible_gpus
     from semgrid_eval.runs.matrix import load_matrix
-    from semgrid_eval.runs.runner import RunOptions, run_matrix
+    from semgrid_eval.runs.runner import RunOptions, run_matrix, wanted_rows
 
     resolved = load_matrix(matrix)
     shared = visible_gpus() if device in ("auto", "cuda") else ()
@@ -96,13 +96,13 @@ def command(
     if dry_run:
         return _show_plan(resolved, logs, out, options)
     record = run_matrix(resolved, logs, out, options, stage=progress)
-    for row in record.rows:
-        if row.failure and (not only or row.name in only):
-            say(f"Error: row {row.name}: {row.failure}")
+    wanted = {row.name for row in wanted_rows(resolved, only)}
+    failed = [row for row in record.rows if row.failure and row.name in wanted]
+    for row in failed:
+        say(f"Error: row {row.name}: {row.failure}")
     for reason in record.failed_logs.values():
         say(f"Error: {reason}")
     click.echo(out)
-    failed = any(row.failure for row in record.rows if not only or row.name in only)
     return 1 if record.failed_logs or failed else 0
 
 

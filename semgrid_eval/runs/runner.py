@@ -2,9 +2,10 @@
 
 import datetime
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
@@ -33,7 +34,7 @@ class RunOptions:
         device: `auto`, `cpu`, `cuda`, `cuda:1`, ...
         grids: folder in which grids are kept.
         command: how the run was started, for the record.
-        only: names of the rows to work on, all where it is empty; what the others have already is kept in the record.
+        only: names or patterns of the rows to work on, all where it is empty; what others have already is kept on record.
         executor: where rows are trained and scored.
         grid_executor: where grids are built and pictures made small.
         validation_logs: folder of the logs to score, where they are not among those to train on.
@@ -83,7 +84,7 @@ def run_matrix(
 
     Raises:
         InputError: there is no log at all, or the device does not exist.
-        ConfigError: `options.only` names a row that the matrix does not have.
+        ConfigError: `options.only` asks for a row that the matrix does not have.
     """
     started = _Clock()
     worker = make_worker(matrix, logs, out, options, stage)
@@ -100,7 +101,7 @@ def run_matrix(
 
     record = keep_record()
     if options.pictures:
-        rows = [row for row in matrix.rows if not options.only or row.name in options.only]
+        rows = wanted_rows(matrix, options.only)
         keep_pictures(out, _scored_windows(worker, rows), options.grid_executor, stage)
     keys = [key for key in units if key in wanted]
     with _unit_work(matrix, logs, out, options, worker, stage) as (work, progress):
@@ -195,14 +196,23 @@ def _worker_at(place: _Place) -> Worker:
     return make_worker(Matrix.model_validate_json(place.matrix), place.logs, place.out, options, silent_stage)
 
 
-def wanted_keys(matrix: Matrix, only: tuple[str, ...]) -> set[str]:
+def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:
+    """Give the rows that are asked for by names or patterns like `BL-*`, all of them where nothing is asked for.
+
+    Raises:
+        ConfigError: a name or pattern fits no row.
+    """
+    found = {pattern: [row for row in matrix.rows if fnmatchcase(row.name, pattern)] for pattern in only}
+    for pattern, rows in found.items():
+        if not rows:
+            names = ", ".join(sorted(row.name for row in matrix.rows))
+            raise ConfigError(f"{pattern!r} is not a row of this matrix: {names}", field="row")
+    return [row for row in matrix.rows if not only or any(row in rows for rows in found.values())]
+
+
+def wanted_keys(matrix: Matrix, only: Sequence[str]) -> set[str]:
     """Give the keys of the units of the rows that are asked for."""
-    names = {row.name for row in matrix.rows}
-    for name in only:
-        if name not in names:
-            raise ConfigError(f"{name!r} is not a row of this matrix: {', '.join(sorted(names))}", field="row")
-    chosen = [row for row in matrix.rows if not only or row.name in only]
-    return {key for row in chosen for key, _ in units_of(row, matrix.seed)}
+    return {key for row in wanted_rows(matrix, only) for key, _ in units_of(row, matrix.seed)}
 
 
 def _finished(worker: Worker, unit: Unit) -> Outcome | None:

@@ -7,6 +7,8 @@ import yaml
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.runs.matrix import load_matrix, preset_names
 
+SCALED = ("paper-cpu", "architecture-cpu", "sensitivity")
+
 
 def load(tmp_path, content):
     path = tmp_path / "m.yaml"
@@ -147,6 +149,13 @@ def test_real_trains_as_paper_cpu_and_scores_windows_that_fit_ten_frames():
         assert row.scored_window.reach_frames <= 9
         assert row.scored_window.step_frames == 3
         assert row.scored_window.horizon_steps == row.window.horizon_steps
+
+
+def test_cpu_presets_share_the_training_of_paper_cpu():
+    rows = {f"{name} {row.name}": row for name in SCALED for row in load_matrix(name).rows}
+    shared = rows["paper-cpu ED-DC"].model_dump(exclude={"name"})
+    assert rows["architecture-cpu ED-d3-f32"].model_dump(exclude={"name"}) == shared
+    assert rows["sensitivity ED-default"].model_dump(exclude={"name"}) == shared
 
 
 def test_a_validation_window_is_as_the_window_where_it_says_nothing(tmp_path):
