@@ -17,7 +17,7 @@ from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, finding_frame, finding_records
 from semgrid_eval.report.longform import category_table, class_table
 from semgrid_eval.report.plots import training_frame
-from semgrid_eval.report.provenance import failures, matrix_file, matrix_text, window_frame
+from semgrid_eval.report.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
 from semgrid_eval.report.reading import Result, Row, Run
 from semgrid_eval.report.regions import region_frame
 from semgrid_eval.report.scaling import scaling
@@ -130,7 +130,12 @@ def report_record(
         "semgrid_eval": __version__,
         "interval": {"level": LEVEL, "draws": DRAWS, "over": "recordings, and seeds where there are several"},
         "runs": [
-            {"tag": run.tag, "scaling": scaling(run), "record": run.record.model_dump(mode="json", exclude={"rows"})}
+            {
+                "tag": run.tag,
+                "scaling": scaling(run),
+                "data": data_sets(run),
+                "record": run.record.model_dump(mode="json", exclude={"rows"}),
+            }
             for run in runs
         ],
         "failures": [vars(failure) for failure in failures(runs)],

@@ -1,12 +1,14 @@
 """Where a report's numbers come from: failures, logs, results, versions and the commands that made them."""
 
 import shlex
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
 import yaml
 
+from semgrid_eval.files import digest_value
 from semgrid_eval.report.cells import Cell, Line, Table, plural
 from semgrid_eval.report.reading import Row, Run
 from semgrid_eval.report.scaling import scaling
@@ -50,10 +52,26 @@ def facts(run: Run, runs: Sequence[Run]) -> Facts:
         ("Command", record.command),
         ("Started", record.started),
         ("Duration", duration(record.seconds)),
+        *(("Data", text) for text in data_sets(run)),
         *((f"Version of {name}", version) for name, version in sorted(record.versions.items())),
         *((f"Machine: {name.replace('_', ' ')}", value) for name, value in sorted(record.machine.items())),
     ]
     return Facts(tuple(entries), scaling(run), matrix_text(run), matrix_file(run, runs))
+
+
+def data_sets(run: Run) -> list[str]:
+    """Name each data set of a run with its logs by split and a digest of them all, equal where all logs are."""
+    found: dict[str, list[tuple[str, str, str]]] = {}
+    for log in run.record.logs:
+        found.setdefault(log.dataset, []).append((log.split, log.name, log.digest))
+    return [
+        f"{name}: {_by_split(split for split, *_ in logs)}; digest {digest_value(sorted(logs))}"
+        for name, logs in sorted(found.items())
+    ]
+
+
+def _by_split(splits: Iterable[str]) -> str:
+    return " and ".join(f"{plural(count, 'log')} of {split}" for split, count in sorted(Counter(splits).items()))
 
 
 def matrix_text(run: Run) -> str:
