@@ -34,7 +34,7 @@ class RunOptions:
         device: `auto`, `cpu`, `cuda`, `cuda:1`, ...
         grids: folder in which grids are kept.
         command: how the run was started, for the record.
-        only: names or patterns of the rows to work on, all where it is empty; what others have already is kept on record.
+        only: names or patterns of the rows to work on, all where it is empty; what others have is kept on record.
         executor: where rows are trained and scored.
         grid_executor: where grids are built and pictures made small.
         validation_logs: folder of the logs to score, where they are not among those to train on.
