@@ -41,7 +41,7 @@ def grids(tmp_path_factory):
 
 def nearly_whole_cells_apart(recording):
     """Choose the two frames between which the way is nearest to whole cells, so that rounding it hides nothing."""
-    pairs = [(old, new) for old in range(6) for new in range(old + 8, FRAMES)]
+    pairs = [(old, new) for old in range(FRAMES) for new in range(old + 6, FRAMES)]
     ways = [(recording.position_m[new] - recording.position_m[old]) / CELL_M for old, new in pairs]
     rests = [np.abs(way - np.rint(way)).max() for way in ways]
     (old, new), way = pairs[int(np.argmin(rests))], ways[int(np.argmin(rests))]
