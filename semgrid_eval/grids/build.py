@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.arrays import read_arrays, write_arrays
-from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, NO_POINT, class_map
 from semgrid_eval.errors import LogError, ResultError, SemgridError
 from semgrid_eval.executors import Executor, InProcess, WorkerDied
 from semgrid_eval.files import digest_value
@@ -145,21 +144,13 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
         ]
 
 
-def grid_classes_by_label(config: GridConfig) -> NDArray[np.uint8]:
-    """Return the table (256,) from label id to grid class with the configuration's replacements (reading 21)."""
-    table = class_map()
-    for label, name in config.class_map.items():
-        table[LABEL_ID[label]] = NO_POINT if name is None else CLASS_NAMES.index(name)
-    return table
-
-
 class _Stretch:
     """Turns frames into grids; what does not change from frame to frame is computed once."""
 
     def __init__(self, reader: LogReader, camera: str, config: GridConfig) -> None:
         self._calibration = reader.calibration(camera)
         self._config = config
-        self._table = grid_classes_by_label(config)
+        self._table = config.class_by_label()
         self._rays: dict[tuple[int, int], GroundRays] = {}
         self._crops = np.array([[s.top_px, s.bottom_px, s.left_px, s.right_px] for s in config.all_sensors()], np.int64)
 

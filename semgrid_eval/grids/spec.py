@@ -2,9 +2,11 @@
 
 from typing import Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from semgrid_eval.classes import CLASS_NAMES, LABEL_ID
+from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, NO_POINT, class_map
 from semgrid_eval.config import Config
 
 TARGET_SENSOR = "full"
@@ -91,6 +93,13 @@ class GridConfig(Config):
             if sensor.bottom_px > height or sensor.right_px > width:
                 raise ValueError(f"sensor {sensor.name} reaches beyond the image of {width} x {height} px")
         return self
+
+    def class_by_label(self) -> NDArray[np.uint8]:
+        """Return the table (256,) from label id to grid class with this configuration's replacements (reading 21)."""
+        table = class_map()
+        for label, name in self.class_map.items():
+            table[LABEL_ID[label]] = NO_POINT if name is None else CLASS_NAMES.index(name)
+        return table
 
     def all_sensors(self) -> tuple[Sensor, ...]:
         """Return the whole image, which gives the targets, and then the crops."""

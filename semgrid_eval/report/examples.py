@@ -23,10 +23,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Contest:
-    """A model, the baselines that it is measured against."""
+    """A model and the rows that it is measured against.
+
+    Args:
+        model: the row.
+        rivals: baselines, or the same model asked to look further ahead.
+        baselines: in the second case, the baseline of the model's horizon and of each rival's, None where none is.
+    """
 
     model: Row
     rivals: tuple[Row, ...]
+    baselines: tuple[Row | None, ...] = ()
 
     @property
     def result(self) -> Result:
@@ -64,9 +71,9 @@ def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
     rivals = [row for row in named if row is not None and row != main] or _default_rivals(main, rows, headline)
     others = [(row, reference_of(row, rows)) for row in rows if not row.is_baseline and row != main]
     found = [Contest(main, tuple(rivals))]
-    later = [row for row in rows if _asks_later(row, main)]
+    later = sorted((row for row in rows if _asks_later(row, main)), key=lambda row: row.record.horizon_steps)
     if later:
-        found.append(Contest(main, tuple(later)))
+        found.append(Contest(main, tuple(later), tuple(reference_of(row, rows) for row in (main, *later))))
     return found + [Contest(row, (reference,)) for row, reference in others if reference is not None]
 
 
@@ -90,6 +97,25 @@ def choose_by_class(contest: Contest) -> list[Pick]:
         label = name.replace("_", " ").capitalize()
         picks += [Pick(int(i), f"{label}, {end}", float(gaps[i, index])) for i, end in ends]
     return picks
+
+
+def by_window(picks: Sequence[Pick]) -> list[tuple[Pick, ...]]:
+    """Gather picks of the same window, windows in the order of their first pick."""
+    found: dict[int, list[Pick]] = {}
+    for pick in picks:
+        found.setdefault(pick.index, []).append(pick)
+    return [tuple(group) for group in found.values()]
+
+
+def mean_iou(result: Result, window: WindowRecord) -> float:
+    """Mean IoU of a result in one window over the known classes with enough cells; NaN where it has no such window."""
+    at = positions(result).get(key_of(window))
+    if at is None:
+        return float("nan")
+    counts = result.counts[[at]].astype(np.int64)
+    values = np.where(counts.sum(axis=2) < MIN_CELLS, np.nan, class_iou(counts))
+    values[:, UNKNOWN] = np.nan
+    return float(_mean_finite(values)[0])
 
 
 def rule_values(contest: Contest) -> Array:

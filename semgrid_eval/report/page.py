@@ -21,10 +21,9 @@ from semgrid_eval.report.claims import MARGIN
 from semgrid_eval.report.colours import class_style
 from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, Headline, headline
 from semgrid_eval.report.estimates import RowScores, score_rows
-from semgrid_eval.report.examples import choose, choose_by_class, contests
 from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, find, finding_table, missing_table, sentence
-from semgrid_eval.report.panels import Group, example_group
+from semgrid_eval.report.gallery import example_groups, gaps
 from semgrid_eval.report.paper import paper_table
 from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.reading import Row, Run, load_runs
@@ -34,7 +33,6 @@ from semgrid_eval.report.where import Where, locate_rows
 
 PAGE = "index.html"
 _SEED = 20190623  # any number does; a fixed one gives the same run the same intervals
-_BEST, _WORST, _OTHER = 3, 3, 1
 
 Scores = Mapping[str, RowScores]
 
@@ -113,6 +111,8 @@ def render_page(material: Material) -> str:
     """Render the page as HTML that needs nothing but itself."""
     runs, scores = material.runs, material.scores
     found = headline(scores)
+    rows = [entry.row for entry in scores.values()]
+    examples = example_groups(rows, found)
     environment = Environment(
         loader=PackageLoader("semgrid_eval.report"),
         autoescape=True,
@@ -122,8 +122,8 @@ def render_page(material: Material) -> str:
     )
     environment.filters["svg_uri"] = lambda text: data_uri(text.encode(), "image/svg+xml")
     return environment.get_template("page.html.j2").render(
-        style=Markup(class_style()) + _source("style.css"),
-        script=_source("page.js") + _source("colours.js"),
+        style=Markup(class_style()) + _source("style.css") + _source("examples.css"),
+        script=_source("page.js") + _source("examples.js") + _source("colours.js"),
         version=__version__,
         runs=runs,
         title=", ".join(each.record.title for each in runs),
@@ -137,7 +137,8 @@ def render_page(material: Material) -> str:
         figures=material.figures,
         legend=(*CLASS_LEGEND, MASK_LEGEND),
         right_legend=RIGHT_LEGEND,
-        examples=example_groups([entry.row for entry in scores.values()], found),
+        examples=examples,
+        gaps=gaps(rows, examples),
         failures=provenance.failures(runs),
         logs=provenance.log_table(runs),
         results=provenance.result_table(runs),
@@ -176,17 +177,6 @@ def confusion_tables(scores: Scores, found: Headline | None) -> list[Table]:
     """Make the confusion tables of the best row and of the baseline it is measured against."""
     rows = [] if found is None else [row for row in (found.best, found.reference or found.rival) if row is not None]
     return [tables.confusion_table(scores[row.name], f"confusion-{i}") for i, row in enumerate(rows)]
-
-
-def example_groups(rows: Sequence[Row], found: Headline | None) -> list[Group]:
-    """Draw the example windows: the main contest, its classes, and one good and one bad window of the others."""
-    chosen = contests(rows, found)
-    if not chosen:
-        return []
-    main, *others = chosen
-    overall = example_group(main, choose(main, best=_BEST, worst=_WORST), shown=True)
-    by_class = example_group(main, choose_by_class(main), note=", class by class")
-    return [overall, by_class, *(example_group(each, choose(each, best=_OTHER, worst=_OTHER)) for each in others)]
 
 
 def _check_replaceable(out: Path) -> None:

@@ -1,31 +1,102 @@
-"""Small PNG pictures of grids, as data URIs that a page carries in itself."""
+"""Small pictures of grids and labels, as data URIs that a page carries in itself."""
 
 import base64
 import io
+import struct
+import zlib
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, class_palette
+from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, NO_POINT, class_palette
 from semgrid_eval.report.colours import class_colours, hex_colour
 
 Grid = NDArray[np.uint8]
 
-MASKED = CLASS_COUNT
+MASKED, POINTLESS, HATCHED = CLASS_COUNT, CLASS_COUNT + 1, CLASS_COUNT + 2
+POINTLESS_COLOUR = (226, 232, 240)
+HATCH_COLOUR = (0, 255, 255)
 RIGHT_COLOURS = ((0, 0, 0), (128, 132, 138), (0, 114, 178), (230, 159, 0), (90, 60, 90), (255, 255, 255))
 RIGHT_LABELS = ("unknown in all", "both right", "only the model right", "only the baseline right", "both wrong", "M")
 _CERTAINTY_LEVELS = 16
+_HATCH_SCALE, _HATCH_STEP = 3, 11  # pixels of an edge of a cell, and from line to line
 
 CLASS_LEGEND = class_colours()
 MASK_LEGEND = ("M (left out)", hex_colour(MASK_COLOUR))
+POINTLESS_LEGEND = ("in no grid (sky, own vehicle)", hex_colour(POINTLESS_COLOUR))
+HATCH_LEGEND = ("hatched: ground that no sensor of an input sees", hex_colour(HATCH_COLOUR))
+LEGEND = (*CLASS_LEGEND, MASK_LEGEND, POINTLESS_LEGEND, HATCH_LEGEND)
+"""Name and colour by class id, then by `MASKED`, `POINTLESS` and `HATCHED`."""
 RIGHT_LEGEND = tuple((name, hex_colour(colour)) for name, colour in zip(RIGHT_LABELS, RIGHT_COLOURS, strict=True))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One picture of an example.
+
+    Args:
+        title: tells it from others of the same moment.
+        alt: what it shows, as its alternative text.
+        uri: its data URI.
+        kind: `camera`, `labels` or `grid`.
+        lead: whether it is the one to show large.
+        colours: which of `LEGEND` appear in it.
+    """
+
+    title: str
+    alt: str
+    uri: str
+    kind: Literal["camera", "labels", "grid"] = "grid"
+    lead: bool = True
+    colours: frozenset[int] = frozenset()
+
+
+def grid_picture(
+    title: str, alt: str, grid: Grid, mask: NDArray[np.bool_] | None = None, *, lead: bool = True
+) -> Picture:
+    """Make the picture of a grid (H, W), mask M in white."""
+    there = np.unique(grid if mask is None else np.where(mask, MASKED, grid)).tolist()
+    return Picture(title, alt, data_uri(grid_png(grid, mask)), lead=lead, colours=frozenset(there))
 
 
 def grid_png(grid: Grid, mask: NDArray[np.bool_] | None = None) -> bytes:
     """Draw a grid in the colour-blind-safe class colours, which a page's reader may switch, M in white: (H, W)."""
     shown = grid if mask is None else np.where(mask, MASKED, grid).astype(np.uint8)
-    return _png(shown, np.vstack([class_palette(safe=True), np.array([MASK_COLOUR], np.uint8)]))
+    return _png(shown, _class_palette())
+
+
+def label_classes(label: bytes, class_by_label: Grid) -> Grid:
+    """Decode label ids from a PNG file and look up their grid classes, `NO_POINT` for those in no grid: (H, W).
+
+    Raises:
+        ValueError: the file is damaged.
+    """
+    try:
+        with Image.open(io.BytesIO(label), formats=["PNG"]) as picture:
+            ids = np.asarray(picture)
+    except (OSError, SyntaxError, struct.error, zlib.error) as error:
+        raise ValueError(f"a label image is damaged: {error}") from error
+    if ids.ndim != 2 or ids.dtype != np.uint8:
+        raise ValueError(f"a label image has shape {ids.shape}, type {ids.dtype}")
+    return np.asarray(class_by_label[ids], np.uint8)
+
+
+def label_png(classes: Grid) -> bytes:
+    """Draw the classes of a label image (H, W) in the colours of grids, what is in no grid in a light gray."""
+    return _png(np.where(classes == NO_POINT, POINTLESS, classes).astype(np.uint8), _class_palette())
+
+
+def hatch_png(cells: NDArray[np.bool_]) -> bytes:
+    """Draw hatching and an outline over cells (H, W), to be laid over a grid; the rest is transparent."""
+    inside = np.kron(cells, np.ones((_HATCH_SCALE, _HATCH_SCALE), np.bool_))
+    around = np.pad(inside, 1)
+    edge = inside & ~(around[:-2, 1:-1] & around[2:, 1:-1] & around[1:-1, :-2] & around[1:-1, 2:])
+    rows, columns = np.indices(inside.shape)
+    line = edge | (inside & ((rows + columns) % _HATCH_STEP == 0))
+    return _png(line.astype(np.uint8), np.array([HATCH_COLOUR, HATCH_COLOUR], np.uint8), bits=1, clear=0)
 
 
 def certainty_png(certainty: Grid) -> bytes:
@@ -49,10 +120,15 @@ def data_uri(content: bytes, kind: str = "image/png") -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
-def _png(indices: Grid, palette: NDArray[np.uint8]) -> bytes:
+def _class_palette() -> Grid:
+    return np.vstack([class_palette(safe=True), np.array([MASK_COLOUR, POINTLESS_COLOUR], np.uint8)])
+
+
+def _png(indices: Grid, palette: NDArray[np.uint8], *, bits: int = 4, clear: int | None = None) -> bytes:
     height, width = indices.shape
     picture = Image.frombytes("P", (width, height), indices.tobytes())
     picture.putpalette(palette.tobytes())
     stream = io.BytesIO()
-    picture.save(stream, "PNG", bits=4, optimize=True)
+    transparent = {} if clear is None else {"transparency": clear}
+    picture.save(stream, "PNG", bits=bits, optimize=True, **transparent)
     return stream.getvalue()

@@ -7,8 +7,17 @@ from support.fake_run import FakeRow, make_fake_run
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.report.comparison import headline
 from semgrid_eval.report.estimates import score_rows
-from semgrid_eval.report.examples import MIN_CELLS, Contest, choose, choose_by_class, contests, rule_values
-from semgrid_eval.report.panels import example_group, shown_time
+from semgrid_eval.report.examples import (
+    MIN_CELLS,
+    Contest,
+    Pick,
+    by_window,
+    choose,
+    choose_by_class,
+    contests,
+    mean_iou,
+    rule_values,
+)
 from semgrid_eval.report.reading import load_runs
 
 CAR, ROAD = CLASS_NAMES.index("car"), CLASS_NAMES.index("road")
@@ -91,13 +100,16 @@ def test_the_papers_contest_comes_first_and_others_follow(run):
 
 def test_longer_horizons_are_shown_in_a_row(tmp_path):
     kinds = (FakeRow("DC", "BL"), *(FakeRow(f"PH{k}", "ED", 0.1, 1, horizon_steps=k + 1) for k in (2, 1)))
+    kinds = (*kinds, FakeRow("PH1", "BL", horizon_steps=2))
     run = make_fake_run(tmp_path / "run", rows=(FakeRow("DC", "ED", 0.1, 1), *kinds), recordings=2)
     loaded = load_runs([run])[0].rows
     got = contests(loaded, headline(score_rows(loaded, np.random.default_rng(0), draws=2)))
     assert [(c.model.name, [r.name for r in c.rivals]) for c in got] == [
         ("ED-DC", ["BL-DC"]),
-        ("ED-DC", ["ED-PH2", "ED-PH1"]),
+        ("ED-DC", ["ED-PH1", "ED-PH2"]),
+        ("ED-PH1", ["BL-PH1"]),
     ]
+    assert [None if row is None else row.name for row in got[1].baselines] == ["BL-DC", "BL-PH1", None]
 
 
 @pytest.mark.parametrize(
@@ -114,36 +126,18 @@ def test_other_runs_get_a_sensible_contest(tmp_path, rows, model, rivals):
     assert (first.model.name, [rival.name for rival in first.rivals]) == (model, rivals)
 
 
-def test_an_example_shows_inputs_target_predictions_and_certainty(run):
-    rows = _rows(run)
-    contest = Contest(rows["ED-Sp2"], (rows["BL-Sp2"],))
-    group = example_group(contest, choose(contest, best=1, worst=0))
-    assert group.problem == ""
-    titles = [picture.title for picture in group.windows[0].pictures]
-    assert titles == [
-        "Input 1 of 2, lower",
-        "Input 1 of 2, upper",
-        "Input 2 of 2, lower",
-        "Input 2 of 2, upper",
-        "Target",
-        "ED-Sp2",
-        "BL-Sp2",
-        "Who is right",
-        "Certainty",
-    ]
+def test_a_window_that_is_picked_twice_is_shown_once():
+    picks = [Pick(4, "Car, largest", 0.1), Pick(2, "Car, smallest", -0.1), Pick(4, "Road, largest", 0.2)]
+    assert by_window(picks) == [(picks[0], picks[2]), (picks[1],)]
 
 
-def test_lost_arrays_are_told_not_raised(tmp_path):
-    run = make_fake_run(tmp_path / "run", recordings=2, windows=1)
-    rows = _rows(run)
-    contest = Contest(rows["ED-DC"], (rows["BL-DC"],))
-    for result in rows["ED-DC"].results:
-        (result.folder / "predictions.npz").unlink()
-    group = example_group(contest, choose(contest, best=1, worst=1))
-    assert group.windows == ()
-    assert "predictions.npz" in group.problem
-
-
-def test_times_are_dates_only_where_the_stamp_is_one():
-    assert shown_time(1_234_567_890) == "1.235 s"
-    assert shown_time(1_500_000_000_250_000_000) == "2017-07-14 02:40:00.250 UTC"
+def test_the_iou_of_a_window_is_the_mean_over_known_classes_with_enough_cells(run):
+    row = _with_counts(_rows(run)["ED-DC"], [_car(80), _car(MIN_CELLS - 1, MIN_CELLS - 1)])
+    result = row.shown
+    counts = result.counts.copy()
+    counts[0, ROAD, ROAD], counts[0, 0, 0] = 60, 1000
+    result = replace(result, counts=counts)
+    first, second = result.record.windows
+    assert mean_iou(result, first) == pytest.approx((80 / 100 + 60 / 80) / 2)  # 20 cells of car were taken for road
+    assert np.isnan(mean_iou(result, second))
+    assert np.isnan(mean_iou(result, first.model_copy(update={"recording": "another"})))

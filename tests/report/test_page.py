@@ -84,7 +84,7 @@ def test_the_page_needs_no_network(page):
 def test_three_example_windows_and_their_traces_are_shown(page):
     found = _read(page)
     assert [a["class"] for a in found.all("article")].count("window") >= 3
-    for words in ("Input 1 of 2", "Target", "BL-NT", "Certainty", "frame 20", "log val/town_00"):
+    for words in ("Input 1 of 2", "Target", "BL-NT", "Certainty", "frame 20", "val/town_00"):
         assert words in found.text
 
 

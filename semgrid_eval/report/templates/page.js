@@ -83,31 +83,6 @@
     holder.prepend(tools);
   }
 
-  const flip = (views) => {
-    const steps = [...views.querySelectorAll("[data-step]")];
-    const picture = element("img", { className: "grid" });
-    const title = element("output", {});
-    const slider = element("input", { type: "range", min: 0, max: steps.length - 1, value: steps.length - 1 });
-    slider.setAttribute("aria-label", "Step from the inputs over the target to the prediction");
-    const show = () => {
-      const source = steps[slider.value].querySelector("img");
-      Object.assign(picture, { src: source.src, alt: source.alt });
-      title.value = steps[slider.value].querySelector("figcaption").textContent;
-      slider.setAttribute("aria-valuetext", title.value);
-    };
-    let timer = 0;
-    const play = element("button", { type: "button", textContent: "Play" });
-    play.onclick = () => {
-      if (timer) timer = clearInterval(timer) ?? 0;
-      else timer = setInterval(() => { slider.value = (Number(slider.value) + 1) % steps.length; show(); }, 700);
-      play.textContent = timer ? "Stop" : "Play";
-    };
-    slider.oninput = show;
-    show();
-    views.prepend(element("figure", { className: "flip" }, picture, element("figcaption", {}, play, slider), title));
-  };
-  document.querySelectorAll(".views").forEach(flip);
-
   for (const cell of document.querySelectorAll("td.command")) {
     const copy = element("button", { type: "button", className: "copy" }, "Copy");
     copy.setAttribute("aria-label", `Copy: ${cell.textContent}`);
