@@ -6,8 +6,9 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import progress, say
+from semgrid_eval.cli.work import chosen_executor, executor_options
 from semgrid_eval.errors import MissingExtraError
-from semgrid_eval.executors import available_cores, local_executor
+from semgrid_eval.executors import available_cores
 from semgrid_eval.frames.cityscapes import CAMERA_NAME, find_sequences
 from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
 
@@ -79,6 +80,7 @@ def command() -> None:
     show_default="all cores",
     help="Logs at once.",
 )
+@executor_options
 @click.option("--camera-name", default=CAMERA_NAME, show_default=True, help="Name of the camera in the logs.")
 def cityscapes(
     src: Path,
@@ -86,6 +88,8 @@ def cityscapes(
     labels: Path | None,
     splits: tuple[str, ...],
     workers: int,
+    executor: str,
+    address: str,
     camera_name: str,
     *,
     train_ids: bool,
@@ -103,6 +107,7 @@ def cityscapes(
     """
     sequences = find_sequences(src, splits=splits, labels=labels, train_ids=train_ids, camera_name=camera_name)
     jobs = [ConversionJob(name=s.name, split=s.split, digest=s.digest, load=s.recording) for s in sequences]
+    work_on = chosen_executor(executor, address, workers)
     with progress("convert") as watch:
-        summary = convert_recordings(jobs, out, executor=local_executor(workers), progress=watch)
+        summary = convert_recordings(jobs, out, executor=work_on, progress=watch)
     return show(summary, out)

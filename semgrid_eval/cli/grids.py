@@ -5,8 +5,9 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import progress, say
+from semgrid_eval.cli.work import chosen_executor, executor_options
 from semgrid_eval.config import load_yaml, parse_config
-from semgrid_eval.executors import available_cores, local_executor
+from semgrid_eval.executors import available_cores
 
 
 @click.command("grids", epilog="Example: semgrid-eval grids logs grids")
@@ -16,7 +17,8 @@ from semgrid_eval.executors import available_cores, local_executor
 @click.option(
     "--workers", type=click.IntRange(1, 256), default=available_cores(), show_default="all cores", help="Logs at once."
 )
-def command(logs: Path, out: Path, config: Path | None, workers: int) -> int:
+@executor_options
+def command(logs: Path, out: Path, config: Path | None, workers: int, executor: str, address: str) -> int:
     """Build the semantic grids of all LOGS into the folder OUT.
 
     Each recording is built once for a configuration and found again by the digest of log and configuration.
@@ -26,8 +28,9 @@ def command(logs: Path, out: Path, config: Path | None, workers: int) -> int:
     from semgrid_eval.log.store import find_logs
 
     grid_config = parse_config(GridConfig, load_yaml(config) or {}, path=config) if config else GridConfig()
+    work_on = chosen_executor(executor, address, workers)
     with progress("grids") as watch:
-        data = build_grids(find_logs(logs), out, grid_config, executor=local_executor(workers), progress=watch)
+        data = build_grids(find_logs(logs), out, grid_config, executor=work_on, progress=watch)
     for reason in data.failed.values():
         say(f"Error: {reason}")
     say(f"{len(data.recordings)} recordings in {out}: {data.built} logs built, {data.reused} re-used")

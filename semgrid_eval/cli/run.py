@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
-from semgrid_eval.executors import Executor, available_cores, local_executor
+from semgrid_eval.cli.work import chosen_executor, executor_options
+from semgrid_eval.executors import available_cores
 
 if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.runs.matrix import Matrix
@@ -28,6 +29,9 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     type=click.Path(path_type=Path, file_okay=False),
     help="Trained networks (default: OUT/trainings); those of another run are used where they fit.",
 )
+@click.option(
+    "--model", "models", multiple=True, help="One more row: a model of your own, path.py:Class, or an installed one."
+)
 @click.option("--row", "only", multiple=True, help="Only this row, or rows like 'BL-*'; may be repeated.")
 @click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Rows trained at once.")
@@ -38,10 +42,7 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     show_default="all cores",
     help="Logs made into grids at once.",
 )
-@click.option("--executor", type=click.Choice(["local", "ray"]), default="local", show_default=True)
-@click.option(
-    "--address", default="local", show_default=True, help="Of a running Ray cluster; 'local' starts one here."
-)
+@executor_options
 @click.option("--gpus", type=click.FloatRange(0), default=0.0, help="With Ray: GPUs for each row; fractions share one.")
 @click.option(
     "--pictures/--no-pictures", default=True, show_default=True, help="Keep small pictures for the report's examples."
@@ -54,6 +55,7 @@ def command(
     grids: Path | None,
     validation_logs: Path | None,
     trainings: Path | None,
+    models: tuple[str, ...],
     only: tuple[str, ...],
     device: str,
     jobs: int,
@@ -73,22 +75,24 @@ def command(
     Rows can be spread over processes of this machine (--jobs) or over a Ray cluster (--executor ray), whose machines
     must all reach the folders of logs, grids and the run under the same paths.
 
+    --model adds a row named after the class, with the defaults of MATRIX.
+
     --dry-run builds the grids, which a run then finds, times a few updates of each network, and prints the plan.
     """
     from semgrid_eval.models.device import visible_gpus
     from semgrid_eval.runs.matrix import load_matrix
     from semgrid_eval.runs.runner import RunOptions, run_matrix, wanted_rows
 
-    resolved = load_matrix(matrix)
+    resolved = load_matrix(matrix, models=models)
     shared = visible_gpus() if device in ("auto", "cuda") else ()
-    rows_on: Executor = local_executor(jobs, gpus=shared) if executor == "local" else _ray(address, jobs, gpus)
+    rows_on = chosen_executor(executor, address, jobs, gpus=gpus, shared=shared)
     options = RunOptions(
         device,
         grids or out / "grids",
         command_line(),
         only,
         rows_on,
-        local_executor(workers),
+        chosen_executor(executor, address, workers),
         pictures,
         validation_logs,
         trainings,
@@ -117,11 +121,3 @@ def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -
         click.echo("\t".join(map(str, (",".join(unit.rows), *numbers, f"{unit.seconds / 60:.1f}", state))))
     say(f"About {total_seconds(units) / 60:.0f} minutes on this machine, one row at a time.")
     return 1 if any(unit.failure for unit in units) else 0
-
-
-def _ray(address: str, jobs: int, gpus: float) -> Executor:
-    from semgrid_eval.runs.executors import LOCAL, RayExecutor
-
-    if address == LOCAL:
-        return RayExecutor(local_cpus=jobs, gpus=gpus)
-    return RayExecutor(address, gpus=gpus)

@@ -2,8 +2,11 @@
 
 import importlib
 import logging
+import os
 import socket
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
 from typing import Any, TypeVar
 
 from semgrid_eval.errors import InputError, MissingExtraError
@@ -50,7 +53,7 @@ class RayExecutor:
     def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
         """Yield (index of the item, result) as results come; leaving early cancels what has not begun."""
         remote = self._ray.remote(num_cpus=self._cpus, num_gpus=self._gpus, max_retries=1)(_apply)
-        pending = {remote.remote(function, item): index for index, item in enumerate(items)}
+        pending = {remote.remote(function, item, str(Path.cwd())): index for index, item in enumerate(items)}
         try:
             while pending:
                 finished, _ = self._ray.wait(list(pending), num_returns=1)
@@ -81,8 +84,10 @@ class RayExecutor:
             raise InputError(f"cannot be reached: {error}", field=f"ray {address}") from error
 
 
-def _apply(function: Callable[[T], R], item: T) -> R:
-    """Call the function: Ray takes plain functions only, no partial ones."""
+def _apply(function: Callable[[T], R], item: T, folder: str) -> R:
+    """Call the function where paths mean what they mean here; Ray takes plain functions only, no partial ones."""
+    with suppress(OSError):  # another machine may lack the folder, and whole paths need none
+        os.chdir(folder)
     return function(item)
 
 

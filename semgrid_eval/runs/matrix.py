@@ -1,7 +1,7 @@
 """Experiment matrices: YAML files of rows, with defaults and axes, resolved into complete rows."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -153,13 +153,15 @@ def preset_names() -> list[str]:
     return sorted(file.name.removesuffix(".yaml") for file in files if file.name.endswith(".yaml"))
 
 
-def load_matrix(name_or_path: str) -> Matrix:
-    """Read a matrix file, or a preset by its name.
+def load_matrix(name_or_path: str, *, models: Sequence[str] = ()) -> Matrix:
+    """Read a matrix file, or a preset by its name, and add a row for each of `models`, named after its class.
 
     Raises:
         ConfigError: names file, row and key at fault.
     """
-    return _resolve(*_read(name_or_path))
+    file, path = _read(name_or_path)
+    added = [{"name": model.rpartition(":")[2], "model": model} for model in models]
+    return _resolve(file.model_copy(update={"rows": [*file.rows, *added]}), path)
 
 
 def _read(name: str, *above: Path) -> tuple[_MatrixFile, Path]:

@@ -99,6 +99,17 @@ def test_faults_name_file_row_and_key(tmp_path, rows, message):
         load(tmp_path, {"rows": rows})
 
 
+def test_models_of_ones_own_are_rows_with_the_matrix_s_defaults(tmp_path):
+    write(tmp_path, mine={"defaults": {"mask_mode": "off"}, "rows": [{"name": "a", "model": "newest"}]})
+    rows = load_matrix(str(tmp_path / "mine.yaml"), models=["lib/mine.py:Mine", "mine.py:Other"]).rows
+    assert [(row.name, row.model, row.kind, row.mask_mode) for row in rows[1:]] == [
+        ("Mine", "lib/mine.py:Mine", "Mine", "off"),
+        ("Other", "mine.py:Other", "Other", "off"),
+    ]
+    with pytest.raises(ConfigError, match="'de' is not one of"):
+        load_matrix("smoke", models=["de"])
+
+
 def test_a_name_that_is_neither_file_nor_preset_lists_the_presets():
     with pytest.raises(ConfigError, match=r"papre: is neither a file nor a preset \(.*paper.*\)"):
         load_matrix("papre")

@@ -1,0 +1,44 @@
+"""Options that say where the work of a command is done: in processes of this machine, or on a Ray cluster."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+import click
+
+from semgrid_eval.executors import Executor, local_executor
+
+LOCAL = "local"
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def executor_options(command: Command) -> Command:
+    """Add --executor and --address, in this order, to a command."""
+    address = click.option(
+        "--address", default=LOCAL, show_default=True, help="Of a running Ray cluster; 'local' starts one here."
+    )
+    executor = click.option("--executor", type=click.Choice([LOCAL, "ray"]), default=LOCAL, show_default=True)
+    return executor(address(command))
+
+
+def chosen_executor(
+    name: str, address: str, workers: int, *, gpus: float = 0.0, shared: Sequence[str] = ()
+) -> Executor:
+    """Make the executor that options ask for.
+
+    Args:
+        name: `local` or `ray`.
+        address: of a Ray cluster.
+        workers: pieces of work at once, where that is not for a cluster to say.
+        gpus: for each piece of work on Ray.
+        shared: GPUs that local processes share, as CUDA names them.
+
+    Raises:
+        MissingExtraError: Ray is asked for and not installed.
+        InputError: the cluster cannot be reached, or never has what a piece of work asks for.
+    """
+    if name == LOCAL:
+        return local_executor(workers, gpus=shared)
+    from semgrid_eval.runs.executors import RayExecutor
+
+    return RayExecutor(address, gpus=gpus, local_cpus=workers if address == LOCAL else None)
