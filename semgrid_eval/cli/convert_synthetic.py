@@ -9,9 +9,10 @@ import click
 from click.core import ParameterSource
 
 from semgrid_eval.cli.console import progress, say
+from semgrid_eval.cli.work import chosen_executor, executor_options
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
-from semgrid_eval.executors import available_cores, local_executor
+from semgrid_eval.executors import Executor, available_cores, local_executor
 from semgrid_eval.frames.synthetic.benchmark import (
     BENCHMARKS,
     SIZES,
@@ -38,13 +39,21 @@ _CACHE = ".towns"
 _DEFAULTS = {name: field.default for name, field in SyntheticConfig.model_fields.items()}
 
 
-def convert(out: Path, *, workers: int, cache: Path | None = None, **options: Any) -> ConversionSummary:  # noqa: ANN401
+def convert(
+    out: Path,
+    *,
+    workers: int,
+    cache: Path | None = None,
+    executor: Executor | None = None,
+    **options: Any,  # noqa: ANN401
+) -> ConversionSummary:
     """Simulate towns, draw recordings from them and write their logs; what is there already is kept.
 
     Args:
         out: folder of the logs; `cache` is a folder inside it unless given.
         workers: processes at once.
         cache: where towns are kept.
+        executor: renders the recordings; by default those processes.
         options: fields of `SyntheticConfig`.
 
     Raises:
@@ -55,11 +64,17 @@ def convert(out: Path, *, workers: int, cache: Path | None = None, **options: An
     config = parse_config(SyntheticConfig, options)
     with progress("simulate") as watch:
         plans = plan_recordings(config, cache or out / _CACHE, watch, workers=workers)
-    return _render(plans, out, workers)
+    return _render(plans, out, executor or local_executor(workers))
 
 
 def convert_benchmark(
-    out: Path, benchmark: Benchmark, size: SizeName, *, workers: int, cache: Path | None = None
+    out: Path,
+    benchmark: Benchmark,
+    size: SizeName,
+    *,
+    workers: int,
+    cache: Path | None = None,
+    executor: Executor | None = None,
 ) -> tuple[ConversionSummary, Comparison | None]:
     """Write the logs of a frozen benchmark and hold them against the published ones.
 
@@ -69,6 +84,7 @@ def convert_benchmark(
         size: of the benchmark.
         workers: processes at once.
         cache: where towns are kept.
+        executor: renders the recordings; by default those processes.
 
     Raises:
         InputError: SUMO failed, a folder cannot be written to, or a log cannot be read again.
@@ -78,7 +94,7 @@ def convert_benchmark(
         plans = plan_recordings(
             benchmark.config(size), cache or out / _CACHE, watch, workers=workers, dataset=benchmark.dataset(size)
         )
-    summary = _render(plans, out, workers)
+    summary = _render(plans, out, executor or local_executor(workers))
     if summary.failed:
         return summary, None
     labels = sorted(summary.written + summary.skipped)
@@ -87,10 +103,10 @@ def convert_benchmark(
     return summary, compare(benchmark.sizes[size], dict(zip(labels, found, strict=True)))
 
 
-def _render(plans: list[RecordingPlan], out: Path, workers: int) -> ConversionSummary:
+def _render(plans: list[RecordingPlan], out: Path, executor: Executor) -> ConversionSummary:
     jobs = [ConversionJob(plan.name, plan.split, plan.digest, partial(render_recording, plan)) for plan in plans]
     with progress("render") as watch:
-        return convert_recordings(jobs, out, executor=local_executor(workers), progress=watch)
+        return convert_recordings(jobs, out, executor=executor, progress=watch)
 
 
 def _option(name: str, kind: "type | click.Choice[str]", text: str) -> Callable[[_Command], _Command]:
@@ -122,6 +138,7 @@ def _option(name: str, kind: "type | click.Choice[str]", text: str) -> Callable[
 @click.option(
     "--workers", type=click.IntRange(1, 256), default=available_cores(), show_default="all cores", help="Processes."
 )
+@executor_options
 @click.pass_context
 def synthetic(
     context: click.Context,
@@ -131,6 +148,8 @@ def synthetic(
     size: SizeName,
     workers: int,
     cache: Path | None,
+    executor: str,
+    address: str,
     **options: Any,  # noqa: ANN401
 ) -> int:
     """Simulate towns and drive through them: logs OUT/<split>/town<NN>_<recording>_000000.mcap.
@@ -150,16 +169,20 @@ def synthetic(
             raise ConfigError("is the size of a benchmark; name one with --benchmark", field="--size")
         if options["recordings"] is None:
             raise click.UsageError("Missing option '--recordings', or '--benchmark'.", context)
-        return show(convert(out, workers=workers, cache=cache, **options), out)
+        work_on = chosen_executor(executor, address, workers)
+        return show(convert(out, workers=workers, cache=cache, executor=work_on, **options), out)
     if given:
         raise ConfigError(f"is fixed by --benchmark {benchmark}; leave it out", field=f"--{given[0].replace('_', '-')}")
-    return _benchmark(out, load_benchmark(benchmark), size, workers, cache)
+    frozen, work_on = load_benchmark(benchmark), chosen_executor(executor, address, workers)
+    summary, comparison = convert_benchmark(out, frozen, size, workers=workers, cache=cache, executor=work_on)
+    return _show_benchmark(out, frozen, size, summary, comparison)
 
 
-def _benchmark(out: Path, benchmark: Benchmark, size: SizeName, workers: int, cache: Path | None) -> int:
+def _show_benchmark(
+    out: Path, benchmark: Benchmark, size: SizeName, summary: ConversionSummary, comparison: Comparison | None
+) -> int:
     from semgrid_eval.cli.convert import show
 
-    summary, comparison = convert_benchmark(out, benchmark, size, workers=workers, cache=cache)
     code = show(summary, out)
     known = set(summary.written + summary.skipped + list(summary.failed))
     strays = [log for log in find_logs(out) if log.relative_to(out).with_suffix("").as_posix() not in known]

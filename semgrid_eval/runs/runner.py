@@ -116,7 +116,7 @@ def run_matrix(
 def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[WindowSet, str | None]]:
     """Give the windows of rows that have some, and the camera that they show."""
     for row in rows:
-        with suppress(SemgridError):  # its units will tell
+        with suppress(SemgridError, torch.OutOfMemoryError):  # its units will tell
             yield worker.scored_windows(row)[0], row.grid.camera
 
 
@@ -219,7 +219,7 @@ def _finished(worker: Worker, unit: Unit) -> Outcome | None:
     """Find what an earlier run left of a unit."""
     try:
         job = worker.look(unit.row, unit.seed)
-    except SemgridError:
+    except (SemgridError, torch.OutOfMemoryError):
         return None
     return Outcome(job.result_id, None, job.left_out) if worker.is_done(job) else None
 

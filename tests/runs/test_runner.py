@@ -242,13 +242,19 @@ def test_mask_modes_differ_in_the_row_of_unknown_only(logs, tmp_path, mode):
     assert counts[:, 0, 0].sum() == right_unknown + expected
 
 
-def test_a_row_that_has_no_room_is_noted_and_the_others_go_on(logs, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("place", "others"), [("unit.train", None), ("sources.stack_recordings", "out of memory: CUDA")]
+)
+def test_a_row_that_has_no_room_is_noted_and_the_others_go_on(logs, tmp_path, monkeypatch, place, others):
     def no_room(*_args, **_kwargs):
         raise torch.OutOfMemoryError("CUDA out of memory.\nTried to allocate 2 GiB")
 
-    monkeypatch.setattr("semgrid_eval.runs.unit.train", no_room)
-    record = run([{"name": "ED", "model": "ed"}, {"name": "BL", "model": "newest"}], logs, tmp_path / "run")
-    assert [row.failure for row in record.rows] == ["out of memory: CUDA out of memory.", None]
+    monkeypatch.setattr(f"semgrid_eval.runs.{place}", no_room)
+    rows = [{"name": "ED", "model": "ed"}, {"name": "BL", "model": "newest"}]
+    record = run(rows, logs, tmp_path / "run")
+    assert record.rows[0].failure == "out of memory: CUDA out of memory."
+    assert str(record.rows[1].failure).startswith(str(others))
+    assert run(rows, logs, tmp_path / "run", only=("ED",)).rows[0].failure == record.rows[0].failure
 
 
 def test_two_logs_of_one_recording_are_refused(tmp_path):
