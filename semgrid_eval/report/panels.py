@@ -27,6 +27,8 @@ from semgrid_eval.scores.results import PREDICTIONS_FILE, windows_file
 
 Arrays = Mapping[str, NDArray[np.generic]]
 
+_FEWEST_COLUMNS, _MOST_COLUMNS = 4, 6
+
 
 @dataclass(frozen=True)
 class Column:
@@ -72,6 +74,11 @@ class Example:
     legend: tuple[tuple[str, str], ...]
     crops: tuple[Crop, ...] = ()
     hatching: str = ""
+
+    @property
+    def columns(self) -> int:
+        """How many columns stand side by side on a wide screen."""
+        return max(_FEWEST_COLUMNS, min(_MOST_COLUMNS, max(len(self.film), len(self.answers))))
 
 
 def draw_examples(contest: Contest, picks: Sequence[Pick], glimpses: Glimpses) -> Iterator[Example]:

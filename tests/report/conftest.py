@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 from support.fake_run import HOSTILE, FakeRow, make_fake_run
+from support.seen_run import make_seen_run
 
 from semgrid_eval.report.page import write_report
 from semgrid_eval.scores.results import read_run, result_folder, write_run
@@ -16,6 +17,17 @@ def run(tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def page(run, tmp_path_factory) -> Path:
     return write_report(run, tmp_path_factory.mktemp("reports") / "report")
+
+
+@pytest.fixture(scope="session")
+def seen(tmp_path_factory) -> Path:
+    """A real run on toy streets that keeps pictures of its logs, read only."""
+    return make_seen_run(tmp_path_factory.mktemp("seen"))
+
+
+@pytest.fixture(scope="session")
+def seen_page(seen, tmp_path_factory) -> Path:
+    return write_report(seen, tmp_path_factory.mktemp("reports") / "seen")
 
 
 @pytest.fixture(scope="session")
