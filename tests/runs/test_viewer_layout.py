@@ -56,3 +56,61 @@ def test_any_name_of_a_row_gives_a_layout_and_a_plain_topic(name):
     assert shown["foxglovePanelTitle"] == f"Prediction of {name}"
     assert list(shown["topics"]) == [prediction_topic(name)]
     assert re.fullmatch(r"/grid/prediction/[\w.-]+", prediction_topic(name))
+
+
+RENDERER = {
+    "cameraState",
+    "followMode",
+    "followTf",
+    "scene",
+    "transforms",
+    "topics",
+    "layers",
+    "publish",
+    "synchronize",
+}
+PANEL = RENDERER | {"foxglovePanelTitle", "imageMode"}
+CAMERA = {"perspective", "distance", "phi", "thetaOffset", "fovy", "near", "far"}
+CAMERA_POINTS = {"targetOffset": 3, "target": 3, "targetOrientation": 4}
+IMAGE_MODE = {"imageTopic", "calibrationTopic"}
+GRID = {"visible", "colorMode", "colorField", "interpolationMethod"}
+
+
+@pytest.mark.parametrize("cameras", [(), ("front",)])
+def test_the_layout_has_the_form_that_viewers_read(cameras):
+    """As Lichtblick's `LayoutData` and `RendererConfig`, and Foxglove's layout types, have it."""
+    layout = viewer_layout(row(), cameras)
+    assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
+    assert isinstance(layout["playbackConfig"]["speed"], float | int)
+    check_mosaic(layout["layout"])
+    for name, panel in layout["configById"].items():
+        kind, _, identity = name.partition("!")
+        assert kind in ("3D", "Image")
+        assert identity
+        assert set(panel) <= PANEL
+        assert panel["followMode"] in ("follow-pose", "follow-position", "follow-none")
+        assert panel["publish"]["type"] in ("point", "pose", "pose_estimate")
+        check_camera(panel["cameraState"])
+        assert set(panel["imageMode"]) == (IMAGE_MODE if kind == "Image" else set())
+        for settings in panel["topics"].values():
+            assert set(settings) <= GRID
+            assert settings["colorMode"] in ("flat", "gradient", "colormap", "rgba-fields")
+            assert settings["interpolationMethod"] in ("linear", "nearestNeighbor")
+
+
+def check_mosaic(node):
+    if isinstance(node, str):
+        return
+    assert set(node) == {"direction", "first", "second", "splitPercentage"}
+    assert node["direction"] in ("row", "column")
+    assert 0 < node["splitPercentage"] < 100
+    check_mosaic(node["first"])
+    check_mosaic(node["second"])
+
+
+def check_camera(state):
+    assert set(state) in (set(), CAMERA | set(CAMERA_POINTS))
+    for name, value in state.items():
+        parts = value if name in CAMERA_POINTS else [value]
+        assert len(parts) == CAMERA_POINTS.get(name, 1)
+        assert all(isinstance(part, float | int) for part in parts)
