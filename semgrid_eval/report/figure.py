@@ -6,7 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 from semgrid_eval.report.cells import plural
 from semgrid_eval.report.estimates import RowScores
@@ -42,6 +45,7 @@ SETTINGS: Any = {
 PAPER_MARKS: Any = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.8}
 """How the paper's own values are marked: small hollow diamonds."""
 _NAME_CHARACTERS = 18
+_PICTURE_DPI = 160
 
 
 @dataclass(frozen=True)
@@ -90,9 +94,12 @@ def finish(figure: Figure, name: str, source: str, caption: str) -> Plot:
     picture, drawing = io.BytesIO(), io.BytesIO()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")  # names may be in any script
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # it has done its work; without this, each form would be laid out again
-        figure.savefig(picture, format="png", dpi=160, metadata={"Software": None})
+        canvas: Any = FigureCanvasAgg(figure)  # its methods have no types
+        figure.set_dpi(_PICTURE_DPI)
+        canvas.draw()  # lays the figure out, too
+        pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+        Image.fromarray(pixels.copy()).save(picture, "PNG", dpi=(_PICTURE_DPI, _PICTURE_DPI))
+        figure.set_layout_engine("none")  # it has done its work; without this, it would be laid out again
         figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})
     text = drawing.getvalue().decode()
     width_px, height_px = (round(96 * inches) for inches in figure.get_size_inches())

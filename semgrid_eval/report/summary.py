@@ -16,7 +16,10 @@ _WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearl
 
 @dataclass(frozen=True)
 class Tile:
-    """One difference, large: its label, the value, its interval and where they lie on a common axis (percent)."""
+    """One difference, large: its label, the value, its interval and where they lie on a common axis (percent).
+
+    `title` tells what stands behind it.
+    """
 
     label: str
     value: str
@@ -26,6 +29,7 @@ class Tile:
     low: float
     high: float
     at: float
+    title: str
 
 
 @dataclass(frozen=True)
@@ -102,20 +106,26 @@ def _tiles(scores: Scores, found: Headline | None) -> tuple[str, tuple[Tile, ...
     differences = {c: scores[model.name].minus(scores[other.name], c) for c in DIFFERENCE_COLUMNS}
     bounds = [abs(v) for d in differences.values() for v in (d.value, d.low, d.high) if v == v]
     reach = 1.1 * max([*bounds, 1e-3])
-    tiles = tuple(_tile(LABELS[column], difference, reach) for column, difference in differences.items())
+    behind = f"{_results(model)} and {_results(other)}, {plural(model.windows, 'window')}"
+    tiles = tuple(_tile(LABELS[column], difference, reach, behind) for column, difference in differences.items())
     return f"{model.name} \N{MINUS SIGN} {other.name}", tiles
 
 
-def _tile(label: str, difference: Estimate, reach: float) -> Tile:
+def _results(row: Row) -> str:
+    return f"{plural(len(row.results), 'result')} of {row.name}"
+
+
+def _tile(label: str, difference: Estimate, reach: float, behind: str) -> Tile:
     def place(value: float) -> float:
         return round(50 + 50 * (value if value == value else difference.value) / reach, 1)
 
     tone = verdict(difference)
+    title = f"{label}: {behind}; {interval_phrase(difference, with_sign=True)}"
     if difference.value != difference.value:
-        return Tile(label, signed(difference.value), "", tone, "absent", 50.0, 50.0, 50.0)
+        return Tile(label, signed(difference.value), "", tone, "absent", 50.0, 50.0, 50.0, title)
     note = interval(difference, with_sign=True) or "no interval"
     low, high, at = place(difference.low), place(difference.high), place(difference.value)
-    return Tile(label, signed(difference.value), note, tone, _WORDS[tone], low, high, at)
+    return Tile(label, signed(difference.value), note, tone, _WORDS[tone], low, high, at, title)
 
 
 def _pair(found: Headline | None) -> tuple[Row | None, Row | None]:

@@ -31,11 +31,14 @@ def seen_page(seen, tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def side_by_side(run, tmp_path_factory) -> Path:
-    """The page of two runs: `run` and a smaller one named `other`."""
-    rows = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.3, 1))
-    other = make_fake_run(tmp_path_factory.mktemp("runs") / "other", rows=rows, windows=1)
-    return write_report([run, other], tmp_path_factory.mktemp("reports") / "both")
+def side_by_side(tmp_path_factory) -> Path:
+    """The page of two runs of the same two rows, `first` and `other`."""
+    folder = tmp_path_factory.mktemp("runs")
+    runs = [
+        make_fake_run(folder / name, rows=(FakeRow("DC", "BL"), FakeRow("DC", "ED", wrong, 1)), windows=1)
+        for name, wrong in (("first", 0.06), ("other", 0.3))
+    ]
+    return write_report(runs, tmp_path_factory.mktemp("reports") / "both")
 
 
 @pytest.fixture(scope="session")

@@ -134,6 +134,22 @@ def test_files_beside_the_page_are_there(page):
         assert {f"figures/{name}.png", f"figures/{name}.svg"} <= names
 
 
+def test_every_figure_names_the_table_that_it_was_drawn_from(page):
+    text = page.read_text(encoding="utf-8")
+    sources = re.findall(r"Drawn from <code>(.*?)</code>; also as <code>(.*?)</code>", text)
+    assert len(sources) > 5
+    for names in sources:
+        for name in names:
+            assert (page.parent / name).is_file()
+
+
+def test_every_number_tells_what_stands_behind_it(page):
+    cells = [a for a in _read(page).all("td") if "data-sort" in a]
+    without = {a["data-sort"] for a in cells if not a.get("title")}
+    assert len(cells) > 500
+    assert len(without) < 40  # sizes and counts, which stand for themselves
+
+
 def test_the_same_run_gives_the_same_bytes_without_torch(run, page, tmp_path):
     code = """import sys
 from pathlib import Path
@@ -230,7 +246,7 @@ def test_names_are_shown_as_text(troubled):
 
 def test_several_runs_are_shown_side_by_side(side_by_side):
     text = _read(side_by_side).text
-    assert "ED-DC (other) \N{MINUS SIGN} ED-DC (run)" in text
-    assert "BL-DC (run)" in text
+    assert "ED-DC (other) \N{MINUS SIGN} ED-DC (first)" in text
+    assert "BL-DC (first)" in text
     for number in (1, 2):
         assert (side_by_side.parent / f"matrix-{number}.yaml").is_file()

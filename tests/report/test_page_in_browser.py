@@ -96,6 +96,22 @@ def test_nothing_scrolls_sideways(browser, request, name, width):
     assert browser.get_log("browser") == []
 
 
+def test_a_printed_page_holds_every_table(browser, page):
+    _open(browser, page, width=718)  # A4 less its margins
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    script = """
+    window.dispatchEvent(new Event('beforeprint'));
+    const wide = [...document.querySelectorAll('table')].map(table => table.getBoundingClientRect().right);
+    return [Math.max(...wide), document.querySelectorAll('details:not([open])').length,
+            getComputedStyle(document.querySelector('.tools')).display];
+    """
+    right, closed, tools = browser.execute_script(script)
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    assert right <= 718
+    assert closed == 0
+    assert tools == "none"
+
+
 def test_a_wide_figure_is_reached_by_keyboard_on_a_phone(browser, page):
     _open(browser, page, width=390)
     script = """
