@@ -20,7 +20,9 @@ Scores = Mapping[str, RowScores]
 _GROUPS = {"Sp": "SF: sensors fused", "SL": "SL: inputs", "PH": "PH: horizon"}
 _GROUP = re.compile(r"(Sp|SL|PH)\d")
 _GAP = 0.5  # between groups, in bars' places
-_WIDEST_IN = 11.3  # what the page has room for
+_WIDEST_IN, _HALF_IN, _SQUEEZED_IN = 11.3, 5.5, 6.6
+"""Widths: all of the page, half of it, and how wide a figure may be to be squeezed into that half."""
+_LABEL_SHARE = 0.09  # of a panel's height, that a number above a bar takes
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,8 @@ def lay_out(scores: Scores) -> Layout:
 def category_plot(scores: Scores, categories: Sequence[str], name: str) -> Plot:
     """Draw a panel for each of the categories, two to a line."""
     layout = lay_out(scores)
-    width_in = min(_WIDEST_IN, max(4.6, 1.2 + 0.36 * len(layout.places) * layout.models))
+    natural_in = max(4.6, 1.2 + 0.36 * len(layout.places) * layout.models)
+    width_in = min(natural_in, _WIDEST_IN if natural_in > _SQUEEZED_IN else _HALF_IN)
     columns = min(2, len(categories))
     lines = -(-len(categories) // columns)
     with mpl.rc_context(SETTINGS):
@@ -79,11 +82,15 @@ def category_plot(scores: Scores, categories: Sequence[str], name: str) -> Plot:
 
 
 def _panel(axes: Axes, scores: Scores, category: str, layout: Layout) -> None:
-    wide = 0.8 / layout.models
+    wide, models = 0.8 / layout.models, list(layout.colours)
+    label_iou = _LABEL_SHARE * _highest(scores, category)
     for experiment, place in layout.places.items():
         entries = [entry for entry in scores.values() if _experiment(entry) == experiment]
+        entries.sort(key=lambda entry: models.index(entry.row.record.model))
         for at, entry in enumerate(entries):
-            _bar(axes, entry, category, place + (at - (len(entries) - 1) / 2) * wide, wide, layout)
+            middle = place + (at - (len(entries) - 1) / 2) * wide
+            _bar(axes, entry, category, middle, wide, layout.colours[entry.row.record.model])
+            _number(axes, entry, category, middle, label_iou)
     for name, experiments in layout.groups.items():
         first, last = (layout.places[end] for end in (experiments[0], experiments[-1]))
         if name and len(layout.groups) > 1:
@@ -109,17 +116,36 @@ def _panel(axes: Axes, scores: Scores, category: str, layout: Layout) -> None:
     _legend(axes, layout)
 
 
-def _bar(axes: Axes, entry: RowScores, category: str, place: float, wide: float, layout: Layout) -> None:
+def _bar(axes: Axes, entry: RowScores, category: str, place: float, wide: float, colour: str) -> None:
+    """Draw a bar with its interval, its number and the paper's value."""
     estimate = entry.estimate(category)
-    axes.bar(place, np.nan_to_num(estimate.value), 0.92 * wide, color=layout.colours[entry.row.record.model])
+    axes.bar(place, np.nan_to_num(estimate.value), 0.92 * wide, color=colour)
     if np.isfinite(estimate.low):
         axes.plot([place, place], [estimate.low, estimate.high], color=INK, linewidth=1)
-    label = f"{estimate.value:.2f}" if np.isfinite(estimate.value) else "absent"
-    top = float(np.nanmax([estimate.value, estimate.high, 0.0]))
-    axes.annotate(label, (place, top), (0, 2), textcoords="offset points", ha="center", fontsize=7)
-    paper = paper_table().get(entry.row.record.name, {}).get(category)
-    if paper is not None:
+    paper = _paper_value(entry, category)
+    if np.isfinite(paper):
         axes.plot(place + 0.3 * wide, paper, "D", markersize=3.2, **PAPER_MARKS)
+
+
+def _number(axes: Axes, entry: RowScores, category: str, place: float, label_iou: float) -> None:
+    """Write a bar's number above it, and above the paper's mark where that would lie on the number."""
+    estimate, paper = entry.estimate(category), _paper_value(entry, category)
+    top = float(np.nanmax([estimate.value, estimate.high, 0.0]))
+    hidden = np.isfinite(paper) and -label_iou / 4 < paper - top < label_iou
+    label = f"{estimate.value:.2f}" if np.isfinite(estimate.value) else "absent"
+    at = (place, max(top, paper) if hidden else top)
+    axes.annotate(label, at, (0, 4 if hidden else 2), textcoords="offset points", ha="center", fontsize=7)
+
+
+def _paper_value(entry: RowScores, category: str) -> float:
+    return paper_table().get(entry.row.record.name, {}).get(category, np.nan)
+
+
+def _highest(scores: Scores, category: str) -> float:
+    """Give the highest value of a panel, which its height follows."""
+    estimates = [entry.estimate(category) for entry in scores.values()]
+    papers = [_paper_value(entry, category) for entry in scores.values()]
+    return float(np.nanmax([0.0, *papers, *(v for e in estimates for v in (e.value, e.high))]))
 
 
 def _legend(axes: Axes, layout: Layout) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
+from matplotlib.ticker import FuncFormatter
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.report.comparison import HEADLINE
@@ -54,7 +54,7 @@ def calibration_plots(found: Sequence[Where]) -> list[Plot]:
             cells.plot(table.certainty, table.cells / table.cells.sum(), linewidth=1.2, **style)
         right.set(ylabel="share of right cells", xlim=(0, 1), ylim=(0, 1))
         cells.set(xlabel="certainty", ylabel="of all cells", yscale="log")
-        cells.yaxis.set_major_formatter(PercentFormatter(1))
+        cells.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g}%"))
         right.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
         caption = "How often a model is right when it is so certain, above, and how many cells that are, below"
         caption += " (first repeat). It is honest on the dotted line; error is the expected calibration error."

@@ -33,6 +33,29 @@ def test_rows_of_several_runs_keep_their_groups(scores):
     assert lay_out(tagged).groups["SL: inputs"] == ["SL3 (a)", "SL3 (b)"]
 
 
+def _places(svg):
+    """Where each text of a drawing stands: x and y in points, y downwards."""
+    texts = [each for each in ET.fromstring(svg).iter() if each.tag.endswith("text")]
+    return {each.text: (float(each.get("x")), float(each.get("y"))) for each in texts}
+
+
+def test_bars_stand_in_the_order_of_the_legend_whatever_the_order_of_rows():
+    rows = [counted_row(name, {"car": [hits, hits]}) for name, hits in (("ED-DC", 70), ("BL-DC", 30))]
+    places = _places(category_plot(score_rows(rows, np.random.default_rng(0), draws=2), ("vehicles",), "x").svg)
+    assert places["0.30"][0] < places["0.70"][0]
+    assert places["BL"][0] < places["ED"][0]
+
+
+def test_a_number_stands_above_the_papers_mark_where_that_would_lie_on_it():
+    def height_of(name):
+        rows = [counted_row(name, {"car": [53, 53]}), counted_row("BL-Fuse", {"car": [90, 90]})]
+        return _places(category_plot(score_rows(rows, np.random.default_rng(0), draws=2), ("vehicles",), "x").svg)[
+            "0.53"
+        ][1]
+
+    assert height_of("BL-DC") < height_of("BL-Table")  # the paper has 0.535 for the first and nothing for the second
+
+
 def test_a_panel_names_its_groups_and_says_what_it_rests_on(scores):
     panel = category_plot(scores, ("vehicles",), "vehicles")
     texts = [element.text for element in ET.fromstring(panel.svg).iter() if element.tag.endswith("text")]
