@@ -140,7 +140,10 @@ def _shrunk(files: Mapping[str, bytes]) -> FramePictures:
 
 
 def _requests(run: Path, windows: Iterable[tuple["WindowSet", str | None]]) -> list[Request]:
-    """Gather the frames of all windows by log and camera; rows share most of them."""
+    """Gather the frames of all windows by log and camera; rows share most of them.
+
+    Paths are absolute, since the executor's processes may stand elsewhere.
+    """
     logs: dict[Path, Request] = {}
     for chosen, camera in windows:
         data = chosen.data
@@ -148,9 +151,9 @@ def _requests(run: Path, windows: Iterable[tuple["WindowSet", str | None]]) -> l
         owners = np.searchsorted(data.first_frames, frames, side="right") - 1
         for owner in np.unique(owners).tolist():
             stamps_ns = frozenset(data.stamps_ns[frames[owners == owner]].tolist())
-            file = pictures_file(run, data.digests[owner], camera)
+            file = pictures_file(run.resolve(), data.digests[owner], camera)
             known = logs[file].stamps_ns if file in logs else frozenset()
-            logs[file] = Request(Path(data.logs[owner]), data.digests[owner], camera, known | stamps_ns, file)
+            logs[file] = Request(Path(data.logs[owner]).resolve(), data.digests[owner], camera, known | stamps_ns, file)
     return list(logs.values())
 
 

@@ -54,6 +54,14 @@ def test_example_of_run_runs(here):
     assert [row.name for row in read_run(here / "runs" / "first").rows][:2] == ["BL-DC", "BL-NT"]
 
 
+def test_pictures_for_the_report_can_be_left_out(here):
+    arguments = ["run", matrix(here, [{"name": "BL-DC", "model": "newest"}]), "--logs", "logs", "--out", "run"]
+    call(*arguments, "--no-pictures")
+    assert not (here / "run" / "pictures").exists()
+    call(*arguments)
+    assert len(list((here / "run" / "pictures").iterdir())) == 1
+
+
 def test_example_of_grids_runs_and_a_second_time_finds_all(here):
     assert call(*example_of("grids")).return_value == 0
     assert "0 logs built, 2 re-used" in call(*example_of("grids")).stderr
