@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from semgrid_eval.errors import SemgridError
+from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.files import digest_value
+from semgrid_eval.models.checkpoint import HISTORY_FILE, read_history
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.runs.matrix import Matrix, Row
@@ -25,9 +26,9 @@ class PlannedUnit:
 
     Args:
         rows: names of the rows that share it.
-        updates: to be made, 0 where nothing is trained.
+        updates: still to be made, 0 where nothing is left to train.
         samples: windows to be seen by them.
-        seconds: estimated; 0 where the result is there already.
+        seconds: estimated; 0 where the result or the training is there already.
         failure: why it cannot be run.
     """
 
@@ -78,11 +79,25 @@ def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], speed: "_Speed
         job = worker.look(unit.row, unit.seed)
     except SemgridError as error:
         return PlannedUnit(rows, unit.seed, 0, 0, 0, 0.0, done=False, failure=str(error))
-    config = unit.row.training
-    updates = config.updates_until(config.epochs) if job.training else 0
     done = worker.is_done(job)
-    seconds = 0.0 if done or job.training is None else speed.seconds(unit.row, job.training)
-    return PlannedUnit(rows, unit.seed, len(job.scored), updates, updates * config.batch, seconds, done)
+    if done or job.training is None:
+        return PlannedUnit(rows, unit.seed, len(job.scored), 0, 0, 0.0, done)
+    made = _epochs_made(job.training)
+    updates = _updates_left(unit.row, made)
+    seconds = speed.seconds(unit.row, job.training, made) if updates else 0.0
+    return PlannedUnit(rows, unit.seed, len(job.scored), updates, updates * unit.row.training.batch, seconds, done)
+
+
+def _epochs_made(training: Training) -> int:
+    """Count the epochs that an earlier run has left; a damaged training is the run's to report."""
+    try:
+        return len(read_history(training.folder / HISTORY_FILE))
+    except InputError:
+        return 0
+
+
+def _updates_left(row: Row, epochs_made: int) -> int:
+    return row.training.updates_until(row.training.epochs) - row.training.updates_until(epochs_made)
 
 
 class _Speed:
@@ -92,17 +107,16 @@ class _Speed:
         self._worker = worker
         self._seconds_by_shape: dict[str, float] = {}
 
-    def seconds(self, row: Row, training: Training) -> float:
-        """Estimate a whole training with its validation after each epoch."""
+    def seconds(self, row: Row, training: Training, epochs_made: int) -> float:
+        """Estimate the rest of a training with its validation after each epoch."""
         shape = digest_value(
             [row.network.model_dump(), row.training.batch, row.training.precision, training.windows.grids_per_window]
         )
         if shape not in self._seconds_by_shape:
             self._seconds_by_shape[shape] = self._measure(row, training)
         of_update = self._seconds_by_shape[shape]
-        validated = row.training.epochs * len(training.watched or ())
-        updates = row.training.updates_until(row.training.epochs)
-        return of_update * (updates + SCORING_SHARE * validated / row.training.batch)
+        validated = (row.training.epochs - epochs_made) * len(training.watched or ())
+        return of_update * (_updates_left(row, epochs_made) + SCORING_SHARE * validated / row.training.batch)
 
     def _measure(self, row: Row, training: Training) -> float:
         short = row.training.model_copy(

@@ -81,6 +81,17 @@ def test_dry_run_tells_updates_and_minutes_and_trains_nothing(here):
     assert call(*arguments, "--dry-run").stdout.count("\tdone") == 2
 
 
+def test_dry_run_counts_only_the_epochs_that_are_not_trained_yet(here):
+    rows = [{"name": "ED-DC", "model": "ed"}]
+    arguments = ["run", matrix(here, rows), "--logs", "logs", "--trainings", "trainings"]
+    call(*arguments, "--out", "first")
+    planned = [*arguments, "--out", "second", "--dry-run"]
+    assert call(*planned).stdout.splitlines()[1].split("\t")[3:6] == ["0", "0", "0.0"]
+    (history,) = (here / "trainings").glob("*/history.csv")
+    history.write_text("".join(history.read_text().splitlines(keepends=True)[:-1]))
+    assert call(*planned).stdout.splitlines()[1].split("\t")[3:5] == ["3", "6"]
+
+
 BAD_MODELS = """
 import torch
 
