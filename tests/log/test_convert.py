@@ -104,7 +104,8 @@ def test_a_full_disk_ends_the_conversion_in_one_line_and_what_is_written_stays(t
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", fill_the_disk)
-    with pytest.raises(InputError, match=r"c\.mcap: cannot be written: No space left on device; what is written is whole"):
+    line = r"c\.mcap: cannot be written: No space left on device; what is written is whole"
+    with pytest.raises(InputError, match=line):
         convert([job(name) for name in "abcd"], tmp_path)
     assert sorted(path.name for path in (tmp_path / "val").iterdir()) == ["a.mcap", "b.mcap"]
     monkeypatch.undo()
