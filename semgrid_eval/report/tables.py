@@ -81,7 +81,8 @@ def window_means(scores: Scores) -> Table:
         present = np.isfinite(values)
         total, count = np.where(present, values, 0.0).sum(axis=0), present.sum(axis=0)
         means = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
-        rows.append((name, means, [f"{name}: {plural(int(n), 'window')} with it; {_seeds(entry)}" for n in count]))
+        behind = [f"{name}: {plural(int(n), 'window score')}, all seeds together; {_seeds(entry)}" for n in count]
+        rows.append((name, means, behind))
     caption = "Mean over windows of each window's own category scores; windows without a category are left out."
     return _plain_table("windows", caption, [LABELS[column] for column in CATEGORY_COLUMNS], rows)
 

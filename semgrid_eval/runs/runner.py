@@ -202,12 +202,17 @@ def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:
     Raises:
         ConfigError: a name or pattern fits no row.
     """
-    found = {pattern: [row for row in matrix.rows if fnmatchcase(row.name, pattern)] for pattern in only}
+    found = {pattern: [row for row in matrix.rows if _is_asked(row, pattern)] for pattern in only}
     for pattern, rows in found.items():
         if not rows:
             names = ", ".join(sorted(row.name for row in matrix.rows))
             raise ConfigError(f"{pattern!r} is not a row of this matrix: {names}", field="row")
     return [row for row in matrix.rows if not only or any(row in rows for rows in found.values())]
+
+
+def _is_asked(row: Row, pattern: str) -> bool:
+    """Tell whether a name or pattern means a row; a name may itself hold signs of patterns."""
+    return row.name == pattern or fnmatchcase(row.name, pattern)
 
 
 def wanted_keys(matrix: Matrix, only: Sequence[str]) -> set[str]:

@@ -90,8 +90,8 @@ def log_pictures(log: Path, digest: str, camera: str | None, stamps_ns: Iterable
                 break
             if stamp_ns in wanted:
                 with damage_as_log_error(log):
-                    found[stamp_ns][channels[topic]] = read_picture(data)
-    return LogPictures(drive, {stamp: _shrunk(files) for stamp, files in found.items()})
+                    found[stamp_ns][channels[topic]] = _SHRINK[channels[topic]](read_picture(data))
+    return LogPictures(drive, {stamp: FramePictures(**files) for stamp, files in found.items()})
 
 
 def small_image(png: bytes) -> bytes:
@@ -116,6 +116,9 @@ def small_label(png: bytes) -> bytes:
     return with_palette(encode_gray(small), label_palette()[: int(small.max()) + 1])
 
 
+_SHRINK = {"image": small_image, "label": small_label}
+
+
 def _small_size(height: int, width: int) -> tuple[int, int]:
     """Height and width of a picture that is no wider than `WIDTH_PX`."""
     return (height, width) if width <= WIDTH_PX else (max(1, round(WIDTH_PX * height / width)), WIDTH_PX)
@@ -132,11 +135,6 @@ def _drive(reader: LogReader, camera: str) -> Drive:
         track=np.array([(pose.x_m, pose.y_m, pose.yaw_rad) for pose in poses], np.float64),
         projection=unit_projection(reader.calibration(camera), (header.width, header.height)),
     )
-
-
-def _shrunk(files: Mapping[str, bytes]) -> FramePictures:
-    shrink = {"image": small_image, "label": small_label}
-    return FramePictures(**{name: shrink[name](png) for name, png in files.items()})
 
 
 def _requests(run: Path, windows: Iterable[tuple["WindowSet", str | None]]) -> list[Request]:

@@ -108,7 +108,9 @@ class _Share:
 
 def _shares(config: SyntheticConfig) -> list[_Share]:
     """Give each split towns of its own, of the same kinds in the same order, and each town its recordings."""
-    val_towns = config.val_towns or (max(1, round(config.towns * config.val_share)) if config.val_share > 0.0 else 0)
+    # Training keeps a town, however large the share of validation is.
+    by_share = min(config.towns - 1, max(1, round(config.towns * config.val_share))) if config.val_share > 0.0 else 0
+    val_towns = config.val_towns or by_share
     val_recordings = round(config.recordings * config.val_share)
     shares: list[_Share] = []
     for split, towns, recordings in (
