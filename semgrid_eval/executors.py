@@ -10,12 +10,16 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing.sharedctypes import Synchronized
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+if TYPE_CHECKING:
+    from ctypes import Array, c_byte
+    from multiprocessing.sharedctypes import Synchronized
 
 T = TypeVar("T")
 R = TypeVar("R")
 
+_CONTEXT = multiprocessing.get_context("spawn")  # a fork would copy whatever threads and locks the caller holds
 # Libraries read these once, when they are first imported; each worker gets its share of the cores.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -75,29 +79,38 @@ class Processes:
         self._gpus = tuple(gpus)
 
     def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
-        """Yield results as they come; stopping early drops what has not begun."""
-        # One process that is killed takes the work of all others with it, and what found no room may find it alone.
-        again = []
-        for index, result in self._together(function, items):
-            if isinstance(result, WorkerDied) and len(items) > 1:
-                again.append(index)
-            else:
-                yield index, result
-        for index in again:
-            for _, result in self._together(function, [items[index]]):
-                yield index, result
+        """Yield results as they come; stopping early drops what has not begun.
 
-    def _together(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
-        # Fresh processes: a fork would copy whatever threads and locks the caller holds.
-        context = multiprocessing.get_context("spawn")
+        A process that is killed ends all others, too. What was being worked on then is done once more by itself, and
+        what had not begun goes on together.
+        """
+        left, alone = list(range(len(items))), []
+        while left:
+            begun = _CONTEXT.RawArray("b", len(items))
+            lost = []
+            for index, result in self._together(function, items, left, begun):
+                if isinstance(result, WorkerDied) and len(items) > 1:
+                    lost.append(index)
+                else:
+                    yield index, result
+            suspects = [index for index in lost if begun[index]] or lost
+            alone += suspects
+            left = [index for index in lost if index not in suspects]
+        for index in alone:
+            yield from self._together(function, items, [index], _CONTEXT.RawArray("b", len(items)))
+
+    def _together(
+        self, function: Callable[[T], R], items: Sequence[T], chosen: Sequence[int], begun: "Array[c_byte]"
+    ) -> Iterator[tuple[int, R | WorkerDied]]:
+        """Work on the chosen items; of each one whose turn has come, `begun` is 1."""
         pool = ProcessPoolExecutor(
-            min(self.parallel, max(1, len(items))),
-            mp_context=context,
+            min(self.parallel, len(chosen)),
+            mp_context=_CONTEXT,
             initializer=_start_worker,
-            initargs=(self._threads, self._gpus, context.Value("i", 0)),
+            initargs=(self._threads, self._gpus, _CONTEXT.Value("i", 0), begun),
         )
         try:
-            futures: dict[Future[R], int] = {pool.submit(function, item): i for i, item in enumerate(items)}
+            futures: dict[Future[R], int] = {pool.submit(_begin, function, items[i], i): i for i in chosen}
             for future in as_completed(futures):
                 try:
                     yield futures[future], future.result()
@@ -119,7 +132,12 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _start_worker(threads: int, gpus: tuple[str, ...], started: "Synchronized[int]") -> None:
+_begun: "Array[c_byte] | None" = None  # in a worker: marks the items whose turn has come
+
+
+def _start_worker(threads: int, gpus: tuple[str, ...], started: "Synchronized[int]", begun: "Array[c_byte]") -> None:
+    global _begun  # shared memory reaches a process only when it starts
+    _begun = begun
     # Ctrl-C stops the parent alone: it drops what waits, and what is being written is finished.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in _THREAD_VARIABLES:
@@ -128,3 +146,9 @@ def _start_worker(threads: int, gpus: tuple[str, ...], started: "Synchronized[in
         number, started.value = started.value, started.value + 1
     if gpus:
         os.environ["CUDA_VISIBLE_DEVICES"] = gpus[number % len(gpus)]
+
+
+def _begin(function: Callable[[T], R], item: T, index: int) -> R:
+    assert _begun is not None
+    _begun[index] = 1
+    return function(item)

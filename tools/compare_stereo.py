@@ -10,21 +10,24 @@ Example: python tools/compare_stereo.py real=logs/real town=logs/town --windows 
 # ruff: noqa: T201 - what it measures goes to stdout
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
 from pathlib import Path
+from typing import TypeVar
 
 import cv2
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, LABEL_ID, UNKNOWN
+from semgrid_eval.errors import SemgridError
 from semgrid_eval.frames.png import decode_gray
 from semgrid_eval.frames.types import CameraFrame
 from semgrid_eval.grids.build import GridRecording, build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import LogReader, find_logs
+from semgrid_eval.sequences.dataset import shift_grids, shift_in_cells
 
 RANGES_M = ((0, 10), (10, 20), (20, 30), (30, 40), (40, 60))
 STEP_S = 0.3
@@ -38,6 +41,7 @@ _REACH_PX = 4  # of the neighbourhood whose median a pixel is held against
 _EVERY_PX = 3
 _LAST_VOID = LABEL_ID["ground"]
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 
 
 @dataclass
@@ -56,17 +60,30 @@ def main() -> None:
     """Parse the options, measure, and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("logs", nargs="+", help="NAME=FOLDER of logs")
-    parser.add_argument("--frames", type=int, default=2, help="frames of each log whose pixels are measured")
-    parser.add_argument("--windows", type=int, default=4, help="pairs of grids of each log")
-    parser.add_argument("--recordings", type=int, default=10_000, help="logs of each folder")
+    parser.add_argument("--frames", type=_count, default=2, help="frames of each log whose pixels are measured")
+    parser.add_argument("--windows", type=_count, default=4, help="pairs of grids of each log")
+    parser.add_argument("--recordings", type=_count, default=10_000, help="logs of each folder")
     options = parser.parse_args()
-    for entry in options.logs:
-        name, _, folder = entry.rpartition("=")
-        logs = find_logs(Path(folder))
-        logs = logs[:: max(1, len(logs) // options.recordings)][: options.recordings]
-        print(f"{name or folder}: {len(logs)} logs")
-        _print_pixels(_measure_pixels(logs, options.frames))
-        _print_grids(_measure_grids(logs, options.windows))
+    try:
+        for entry in options.logs:
+            name, _, folder = entry.rpartition("=")
+            logs = _spread(find_logs(Path(folder)), options.recordings)
+            print(f"{name or folder}: {len(logs)} logs")
+            _print_pixels(_measure_pixels(logs, options.frames))
+            _print_grids(_measure_grids(logs, options.windows))
+    except SemgridError as error:
+        raise SystemExit(f"Error: {error}") from None
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not 1 or more")
+    return int(text)
+
+
+def _spread(items: Sequence[T], count: int) -> list[T]:
+    """Choose that many items, or all, from first to last."""
+    return [items[i * len(items) // min(count, len(items))] for i in range(min(count, len(items)))]
 
 
 def _measure_pixels(logs: list[Path], count: int) -> Tally:
@@ -76,7 +93,7 @@ def _measure_pixels(logs: list[Path], count: int) -> Tally:
             camera = reader.scene.cameras[0]
             calibration = reader.calibration(camera)
             depth_disparity = calibration.fx_px * calibration.baseline_m
-            for frame in islice(reader.frames(camera), 0, None, max(1, 30 // count)):
+            for frame in _spread(list(reader.frames(camera)), count):
                 _add_pixels(tally, frame, depth_disparity)
     return tally
 
@@ -202,23 +219,11 @@ def _pairs(
 ) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.uint8]]]:
     """Give grids, moved by the vehicle's own motion to the time of the grid `STEP_S` later, and that grid."""
     stamps_s = (recording.stamps_ns - recording.stamps_ns[0]) * 1e-9
-    newest = np.flatnonzero(stamps_s >= STEP_S - 0.02)
-    for index in newest[:: max(1, len(newest) // count)][:count]:
+    for index in _spread(np.flatnonzero(stamps_s >= STEP_S - 0.02).tolist(), count):
         earlier = int(np.argmin(np.abs(stamps_s[index] - STEP_S - stamps_s)))
-        shift = np.rint((recording.position_m[index] - recording.position_m[earlier]) / cell_m)
-        yield _moved(recording.grids[0, earlier], shift.astype(int)), recording.grids[0, index]
-
-
-def _moved(grid: NDArray[np.uint8], shift_cells: NDArray[np.int_]) -> NDArray[np.uint8]:
-    """Move a grid down and to the right; unknown comes in."""
-    down, right = shift_cells
-    moved = np.full_like(grid, UNKNOWN)
-    height, width = grid.shape
-    to_rows, from_rows = slice(max(down, 0), height + min(down, 0)), slice(max(-down, 0), height + min(-down, 0))
-    to_columns = slice(max(right, 0), width + min(right, 0))
-    from_columns = slice(max(-right, 0), width + min(-right, 0))
-    moved[to_rows, to_columns] = grid[from_rows, from_columns]
-    return moved
+        shift = shift_in_cells(recording.position_m[index] - recording.position_m[earlier], cell_m)
+        moved = shift_grids(torch.from_numpy(recording.grids[0, earlier]), torch.from_numpy(shift))
+        yield moved.numpy(), recording.grids[0, index]
 
 
 def _print_grids(total: NDArray[np.int64]) -> None:

@@ -8,9 +8,12 @@ Example: semgrid-eval convert synthetic town --benchmark town-v1 --size small &&
 import sys
 from pathlib import Path
 
+from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.executors import available_cores, local_executor
 from semgrid_eval.files import write_json
 from semgrid_eval.frames.synthetic.benchmark import (
+    BENCHMARKS,
+    SIZES,
     benchmark_digest,
     definition_file,
     load_benchmark,
@@ -25,13 +28,14 @@ from semgrid_eval.progress import silent
 def freeze(out: Path) -> str:
     """Write the fingerprints of all logs below a folder into the definition of their benchmark; return the digest."""
     logs = find_logs(out)
-    with LogReader(logs[0]) as log:
-        name, size = log.scene.dataset.split("/")
+    if not logs:
+        raise InputError("holds no log", path=out)
+    name, size = _dataset(logs)
     definition = load_benchmark(name).model_dump()
     chosen = definition["sizes"][size]
     expected = chosen["train"]["recordings"] + chosen["val"]["recordings"]
     if len(logs) != expected:
-        raise SystemExit(f"{out} holds {len(logs)} logs, {name} {size} has {expected} recordings")
+        raise InputError(f"holds {len(logs)} logs, {name} {size} has {expected} recordings", path=out)
     found = fingerprints(logs, executor=local_executor(available_cores()), progress=silent)
     labels = [log.relative_to(out).with_suffix("").as_posix() for log in logs]
     short = short_fingerprints(dict(zip(labels, found, strict=True)))
@@ -40,7 +44,24 @@ def freeze(out: Path) -> str:
     return f"{name} {size}: digest {benchmark_digest(short)}"
 
 
+def _dataset(logs: list[Path]) -> tuple[str, str]:
+    """Return the benchmark and the size that all logs are of."""
+    known = [f"{name}/{size}" for name in BENCHMARKS for size in SIZES]
+    found = known
+    for log in logs:
+        with LogReader(log) as reader:
+            dataset = reader.scene.dataset
+        if dataset not in found:
+            raise InputError(f"is {dataset}, not {' or '.join(found)}", path=log, field="dataset")
+        found = [dataset]
+    name, _, size = found[0].partition("/")
+    return name, size
+
+
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         raise SystemExit(__doc__)
-    print(freeze(Path(sys.argv[1])))
+    try:
+        print(freeze(Path(sys.argv[1])))
+    except SemgridError as error:
+        raise SystemExit(f"Error: {error}") from None

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
-from semgrid_eval.cli.work import chosen_executor, executor_options
-from semgrid_eval.executors import available_cores
+from semgrid_eval.cli.work import LOCAL, chosen_executor, executor_options
+from semgrid_eval.executors import available_cores, local_executor
 
 if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.runs.matrix import Matrix
@@ -86,13 +86,15 @@ def command(
     resolved = load_matrix(matrix, models=models)
     shared = visible_gpus() if device in ("auto", "cuda") else ()
     rows_on = chosen_executor(executor, address, jobs, gpus=gpus, shared=shared)
+    # A cluster that is started here has --jobs cores, and grids are to be built on --workers.
+    grids_on = local_executor(workers) if address == LOCAL else chosen_executor(executor, address, workers)
     options = RunOptions(
         device,
         grids or out / "grids",
         command_line(),
         only,
         rows_on,
-        chosen_executor(executor, address, workers),
+        grids_on,
         pictures,
         validation_logs,
         trainings,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
+from semgrid_eval.report.changes import flat
 from semgrid_eval.report.comparison import Headline, reference_of
 from semgrid_eval.report.reading import Result, Row
 from semgrid_eval.scores.iou import class_iou
@@ -151,9 +152,14 @@ def _aligned_iou(result: Result, other: Result) -> Array:
 
 def _asks_later(row: Row, main: Row) -> bool:
     """Tell whether a row is the same model asked to look further ahead, at the same target frames."""
-    mine, theirs = main.record, row.record
-    alike = (mine.model, mine.sensors, mine.inputs) == (theirs.model, theirs.sensors, theirs.inputs)
-    return alike and row.run == main.run and theirs.horizon_steps > mine.horizon_steps
+    further = row.record.horizon_steps > main.record.horizon_steps
+    return further and row.run == main.run and _but_horizon(row) == _but_horizon(main)
+
+
+def _but_horizon(row: Row) -> dict[str, object]:
+    """Return what determined a row's numbers, but how far it looks ahead."""
+    config = flat(row.shown.record.config)
+    return {key: value for key, value in config.items() if not key.endswith("horizon_steps")}
 
 
 def _row(rows: Sequence[Row], like: Row, model: str, experiment: str) -> Row | None:

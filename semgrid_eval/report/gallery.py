@@ -12,6 +12,7 @@ from semgrid_eval.report.panels import Example, draw_examples
 from semgrid_eval.report.reading import Row
 
 _BEST, _WORST, _OTHER = 3, 3, 1
+_AHEAD = "Looking further ahead"
 
 
 @dataclass(frozen=True)
@@ -73,9 +74,8 @@ def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
     said = []
     if not any(len(row.record.sensors) > 1 for row in rows):
         said.append("No row has several sensors, so there is no example with a blind band.")
-    horizons = {(row.run, row.record.model, row.record.sensors, row.record.horizon_steps) for row in rows}
-    if len({key[:3] for key in horizons}) == len(horizons):
-        said.append("No model was run with several horizons, so there is no example of them in a row.")
+    if not any(group.title.startswith(_AHEAD) for group in groups):
+        said.append("The model was not run with several horizons, so there is no example of them in a row.")
     shown = [window for group in groups for window in group.windows]
     pictures = [picture for window in shown for column in window.film for picture in column.pictures]
     if shown and not any(picture.kind == "camera" for picture in pictures):
@@ -89,7 +89,7 @@ def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
 def _title(contest: Contest) -> str:
     names = [contest.model.name, *(rival.name for rival in contest.rivals)]
     if contest.baselines:
-        return f"Looking further ahead: {', '.join(names)}"
+        return f"{_AHEAD}: {', '.join(names)}"
     return names[0] + (f" against {' and '.join(names[1:])}" if names[1:] else "")
 
 

@@ -29,12 +29,14 @@ class Glimpses:
         self._run = run
         record = read_run(run)
         self._command = record.command
-        self._digests = {log.path: log.digest for log in record.logs}
+        self._digests = {(log.path, log.digest) for log in record.logs}
         self._read = lru_cache(_LOGS_KEPT)(self._read_log)
 
-    def of(self, log: str, grid: GridConfig | None) -> LogPictures | None:
-        """Return what was kept of a log, None where that is nothing that can be read."""
-        return self._read(log, grid.camera if grid is not None else None)
+    def of(self, log: str, result: Result, grid: GridConfig | None) -> LogPictures | None:
+        """Return what was kept of a log that a result is scored on, None where that is nothing that can be read."""
+        # A log to train on may have the same path in another folder.
+        digest = next((digest for digest in result.record.log_digests if (log, digest) in self._digests), None)
+        return None if digest is None else self._read(digest, grid.camera if grid is not None else None)
 
     def play_command(self, row: Row, window: WindowRecord) -> str:
         """Write the command that plays a window's recording, with the folders that the run's own command names."""
@@ -43,10 +45,10 @@ class Glimpses:
         where = [found.get("--out", "RUN"), row.record.name, "--logs", logs]
         return shlex.join(["semgrid-eval", "play", *where, "--recording", window.recording, "--out", "play.mcap"])
 
-    def _read_log(self, log: str, camera: str | None) -> LogPictures | None:
+    def _read_log(self, digest: str, camera: str | None) -> LogPictures | None:
         try:
-            return read_pictures(pictures_file(self._run, self._digests[log], camera))
-        except (KeyError, ResultError):
+            return read_pictures(pictures_file(self._run, digest, camera))
+        except ResultError:
             return None
 
 

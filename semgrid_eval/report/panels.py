@@ -93,7 +93,7 @@ def draw_examples(contest: Contest, picks: Sequence[Pick], glimpses: Glimpses) -
     shown = _Shown(contest, at)
     for i, group in enumerate(groups):
         window = result.record.windows[at[i]]
-        kept = glimpses.of(window.log, grid)
+        kept = glimpses.of(window.log, result, grid)
         view = View(window, kept, grid, contest.model.record.sensors)
         film = tuple(shown.film(i, view))
         answers = tuple(shown.answers(i))

@@ -22,6 +22,7 @@ HATCH_COLOUR = (0, 255, 255)
 RIGHT_COLOURS = ((0, 0, 0), (128, 132, 138), (0, 114, 178), (230, 159, 0), (90, 60, 90), (255, 255, 255))
 RIGHT_LABELS = ("unknown in all", "both right", "only the model right", "only the baseline right", "both wrong", "M")
 _CERTAINTY_LEVELS = 16
+_MAX_LABEL_PIXELS = 1 << 22  # runs keep small ones
 _HATCH_SCALE, _HATCH_STEP = 3, 11  # pixels of an edge of a cell, and from line to line
 
 CLASS_LEGEND = class_colours()
@@ -76,8 +77,10 @@ def label_classes(label: bytes, class_by_label: Grid) -> Grid:
     """
     try:
         with Image.open(io.BytesIO(label), formats=["PNG"]) as picture:
+            if picture.width * picture.height > _MAX_LABEL_PIXELS:
+                raise ValueError(f"a label image of {picture.width} x {picture.height} is too large")
             ids = np.asarray(picture)
-    except (OSError, SyntaxError, struct.error, zlib.error) as error:
+    except (OSError, SyntaxError, struct.error, zlib.error, Image.DecompressionBombError) as error:
         raise ValueError(f"a label image is damaged: {error}") from error
     if ids.ndim != 2 or ids.dtype != np.uint8:
         raise ValueError(f"a label image has shape {ids.shape}, type {ids.dtype}")

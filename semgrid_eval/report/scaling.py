@@ -16,8 +16,10 @@ def scaling(run: Run) -> str:
     found = [_difference(text, _values(trained, key), theirs) for key, (text, theirs) in PAPER_SETTINGS.items()]
     found.append(_difference("repeats", {len(row.results) for row in trained}, PAPER_REPEATS))
     found.append(_difference("scored windows", {row.windows for row in rows}, PAPER_WINDOWS))
-    sources = sorted({log.dataset for log in run.record.logs} - {PAPER_DATASET})
-    found.append(f"data {' and '.join(sources)} instead of Cityscapes" if sources else "")
+    sources = {log.dataset for log in run.record.logs}
+    others = " and ".join(sorted(sources - {PAPER_DATASET}))
+    place = "besides" if PAPER_DATASET in sources else "instead of"
+    found.append(f"data {others} {place} Cityscapes" if others else "")
     told = [text for text in found if text]
     if not told:
         return "Trained as the paper's supplement says."

@@ -26,7 +26,7 @@ class PlannedUnit:
 
     Args:
         rows: names of the rows that share it.
-        updates: still to be made, 0 where nothing is left to train.
+        updates: still to be made, 0 where nothing is left to train or a unit before it trains the same.
         samples: windows to be seen by them.
         seconds: estimated; 0 where the result or the training is there already.
         failure: why it cannot be run.
@@ -61,10 +61,11 @@ def plan_run(
             if key in sharing:
                 sharing[key].append(row.name)
     speed = _Speed(worker)
+    priced: set[str] = set()
     planned = []
     with stage("plan") as progress:
         for number, (key, unit) in enumerate(units.items(), start=1):
-            planned.append(_plan_unit(worker, unit, tuple(sharing[key]), speed))
+            planned.append(_plan_unit(worker, unit, tuple(sharing[key]), speed, priced))
             progress(number, len(units), unit.row.name)
     return planned
 
@@ -74,14 +75,16 @@ def total_seconds(units: Sequence[PlannedUnit]) -> float:
     return sum(unit.seconds for unit in units)
 
 
-def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], speed: "_Speed") -> PlannedUnit:
+def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], speed: "_Speed", priced: set[str]) -> PlannedUnit:
+    """Plan one unit; `priced` collects the trainings that are counted already, which the unit may share."""
     try:
         job = worker.look(unit.row, unit.seed)
     except SemgridError as error:
         return PlannedUnit(rows, unit.seed, 0, 0, 0, 0.0, done=False, failure=str(error))
     done = worker.is_done(job)
-    if done or job.training is None:
+    if done or job.training is None or job.training.id in priced:
         return PlannedUnit(rows, unit.seed, len(job.scored), 0, 0, 0.0, done)
+    priced.add(job.training.id)
     made = _epochs_made(job.training)
     updates = _updates_left(unit.row, made)
     seconds = speed.seconds(unit.row, job.training, made) if updates else 0.0

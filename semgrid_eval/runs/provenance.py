@@ -4,12 +4,12 @@ import os
 import platform
 import subprocess
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import torch
 
 import semgrid_eval
+from semgrid_eval.packages import installed_versions
 
 _PACKAGES = (
     "torch",
@@ -29,12 +29,7 @@ def versions() -> dict[str, str]:
     found = {"semgrid-eval": semgrid_eval.__version__, "python": platform.python_version()}
     if commit := commit_of(Path(semgrid_eval.__file__).parent):
         found["semgrid-eval (commit)"] = commit
-    for package in _PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return found
+    return found | installed_versions(_PACKAGES)
 
 
 def machine(device: torch.device) -> dict[str, str]:

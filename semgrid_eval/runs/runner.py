@@ -250,7 +250,10 @@ def _record(
     matrix: Matrix, command: str, started: _Clock, worker: Worker, outcomes: dict[str, Outcome]
 ) -> results.RunRecord:
     logs = [log for sources in worker.sources for log in sources.records.values()]
-    failed = {log: reason for sources in worker.sources for log, reason in sources.failed.items()}
+    failed: dict[str, str] = {}
+    for sources in worker.sources:  # a log to train on and one to score may have the same path in their folders
+        for log, reason in sources.failed.items():
+            failed[log] = f"{failed[log]}; {reason}" if log in failed else reason
     return results.RunRecord(
         format_version=results.FORMAT_VERSION,
         title=matrix.title,

@@ -92,6 +92,12 @@ def test_dry_run_counts_only_the_epochs_that_are_not_trained_yet(here):
     assert call(*planned).stdout.splitlines()[1].split("\t")[3:5] == ["3", "6"]
 
 
+def test_dry_run_counts_a_training_that_rows_share_once(here):
+    rows = [{"name": "ED-DC", "model": "ed"}, {"name": "ED-all", "model": "ed", "mask_mode": "off"}]
+    planned = call("run", matrix(here, rows), "--logs", "logs", "--out", "run", "--dry-run").stdout.splitlines()
+    assert [line.split("\t")[3:5] for line in planned[1:]] == [["6", "12"], ["0", "0"]]
+
+
 BAD_MODELS = """
 import torch
 

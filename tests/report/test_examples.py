@@ -112,6 +112,16 @@ def test_longer_horizons_are_shown_in_a_row(tmp_path):
     assert [None if row is None else row.name for row in got[1].baselines] == ["BL-DC", "BL-PH1", None]
 
 
+def test_another_model_at_a_longer_horizon_is_not_shown_in_the_row(seen, tmp_path):
+    rows = [row for row in load_runs([seen])[0].rows if row.record.name in ("BL-DC", "own-DC", "own-PH1")]
+    found = headline(score_rows(rows, np.random.default_rng(0), draws=2))
+    assert [contest.baselines != () for contest in contests(rows, found)] == [False, True]
+    untranslated = rows[2].results[0].record.config | {"translate": False}
+    result = replace(rows[2].results[0], record=rows[2].results[0].record.model_copy(update={"config": untranslated}))
+    changed = [*rows[:2], replace(rows[2], results=(result,))]
+    assert not any(contest.baselines for contest in contests(changed, found))
+
+
 @pytest.mark.parametrize(
     ("rows", "model", "rivals"),
     [

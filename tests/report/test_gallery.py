@@ -49,6 +49,12 @@ def test_what_a_run_cannot_show_is_said(tmp_path):
     assert gaps(loaded, []) == []
 
 
+def test_several_horizons_of_baselines_alone_are_no_example(tmp_path):
+    rows = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 1), FakeRow("PH1", "BL", horizon_steps=2))
+    said = gaps(*gallery(make_fake_run(tmp_path / "run", rows=rows, recordings=2, windows=1)))
+    assert "no example of them in a row" in said[1]
+
+
 def test_a_run_without_pictures_shows_the_same_windows(seen, tmp_path):
     shutil.copytree(seen, tmp_path / "run", ignore=shutil.ignore_patterns("pictures", "grids"))
     rows, groups = gallery(tmp_path / "run")

@@ -2,13 +2,14 @@ import base64
 import io
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
 
 from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, class_palette
-from semgrid_eval.report.pictures import RIGHT_COLOURS, certainty_png, data_uri, grid_png, right_png
+from semgrid_eval.report.pictures import RIGHT_COLOURS, certainty_png, data_uri, grid_png, label_classes, right_png
 
 GRIDS = arrays(np.uint8, (5, 7), elements=st.integers(0, CLASS_COUNT - 1))
 
@@ -22,6 +23,14 @@ def test_each_cell_has_its_class_colour_and_the_mask_is_white(grid, mask):
     got = _colours(grid_png(grid, mask))
     assert (got[mask] == MASK_COLOUR).all()
     np.testing.assert_array_equal(got[~mask], class_palette(safe=True)[grid[~mask]])
+
+
+@pytest.mark.parametrize("side_px", [3_000, 20_000])
+def test_a_label_image_that_is_too_large_is_not_decoded(side_px):
+    stream = io.BytesIO()
+    Image.new("1", (side_px, side_px)).save(stream, "PNG")
+    with pytest.raises(ValueError, match="a label image"):
+        label_classes(stream.getvalue(), np.zeros(256, np.uint8))
 
 
 def test_who_is_right_names_each_case():

@@ -47,6 +47,12 @@ def test_what_is_smaller_is_named_beside_the_papers_value(trained):
     )
 
 
+def test_other_data_beside_the_papers_is_named(trained):
+    logs = [log.model_copy(update={"dataset": name}) for log in trained.record.logs for name in ("town", "cityscapes")]
+    both = replace(trained, record=trained.record.model_copy(update={"logs": tuple(logs)}))
+    assert "data town besides Cityscapes" in scaling(both)
+
+
 def test_rows_that_differ_are_told_apart(trained):
     small = _configured(trained, 1, 500, network={"features": 16}).rows[0]
     large = _configured(trained, 1, 500, network={"features": 32}).rows[1]

@@ -1,6 +1,7 @@
 import os
 import time
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -15,6 +16,15 @@ def square_or_die(value):
     if value == 3:
         os._exit(1)
     return value * value, os.getpid()
+
+
+def work_a_while_or_die(value):
+    """Tell when this was worked on."""
+    if value == 3:
+        os._exit(1)
+    start_s = time.monotonic()
+    time.sleep(0.6)
+    return start_s, time.monotonic()
 
 
 def gpu_when_all_have_begun(folder, expected, _item):
@@ -59,6 +69,14 @@ def test_a_process_that_is_killed_takes_nobody_elses_work_with_it():
     results = dict(Processes(2).run(square_or_die, [1, 3, 2, 4]))
     assert results.pop(1) == WorkerDied()
     assert {index: value for index, (value, _) in results.items()} == {0: 1, 2: 4, 3: 16}
+
+
+def test_what_a_killed_process_had_not_begun_goes_on_together():
+    results = dict(Processes(2).run(work_a_while_or_die, [3, *range(10, 16)]))
+    assert results.pop(0) == WorkerDied()
+    times = sorted(results.values())
+    assert len(times) == 6
+    assert any(later < end for (_, end), (later, _) in pairwise(times))
 
 
 def test_gpus_are_shared_out_among_processes(tmp_path):

@@ -235,6 +235,15 @@ def test_a_users_mistake_is_told_and_leaves_nothing(run, logs, tmp_path, row, op
     assert not list(tmp_path.rglob("play*"))
 
 
+def test_a_log_to_train_on_may_have_the_same_path_as_one_to_score(run, logs, tmp_path):
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    record = results.read_run(copy)
+    same_paths = tuple(log.model_copy(update={"digest": f"{i:016x}"}) for i, log in enumerate(record.logs))
+    results.write_run(copy, record.model_copy(update={"logs": same_paths + record.logs}))
+    assert write_playback(copy, "BL-DC", tmp_path / "play.mcap", logs=logs).recordings == ("toy0#1",)
+
+
 def test_a_row_that_kept_no_predictions_is_told(run, tmp_path):
     copy = tmp_path / "run"
     shutil.copytree(run, copy, ignore=shutil.ignore_patterns("predictions.npz"))

@@ -1,6 +1,7 @@
 import dataclasses
 import json
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -299,6 +300,21 @@ def test_logs_of_another_folder_are_scored_with_the_networks_that_another_run_tr
         rows, logs, tmp_path / "alone", folders={"validation_logs": tmp_path / "real"}, validation_window=scored_windows
     )
     assert [row.results for row in again.rows] == [row.results for row in record.rows]
+
+
+def test_logs_of_both_folders_that_fail_are_told_even_under_one_path(logs, tmp_path):
+    for name in ("town", "real"):
+        shutil.copytree(logs, tmp_path / name)
+        (tmp_path / name / "val" / "broken.mcap").write_bytes(name.encode())
+    record = run(
+        [{"name": "BL-DC", "model": "newest"}],
+        tmp_path / "town",
+        tmp_path / "run",
+        folders={"validation_logs": tmp_path / "real"},
+    )
+    assert list(record.failed_logs) == ["val/broken.mcap"]
+    assert record.failed_logs["val/broken.mcap"].count("val/broken.mcap: ") == 2
+    assert record.rows[0].failure is None
 
 
 def test_logs_to_train_on_need_none_to_validate(logs, tmp_path):

@@ -204,7 +204,9 @@ class _Maker:
     def _result(self, row: FakeRow, seed: int, inputs: Grid, windows_id: str) -> str:
         prediction, certainty = self._predict(row, seed, inputs)
         trained = row.seeds > 0
-        config = {"model": row.model, "experiment": row.experiment, "depth": 3 if trained else None}
+        experiment = row.experiment if row.horizon_steps == 1 else "DC"
+        config = {"model": row.model, "experiment": experiment, "depth": 3 if trained else None}
+        config["window"] = {"horizon_steps": row.horizon_steps}
         result_id = digest_value([config, seed, self.names])
         folder = results.result_folder(self.run, result_id)
         results.write_arrays(folder / "predictions.npz", {"prediction": prediction, "certainty": certainty})

@@ -1,14 +1,11 @@
 """Named, frozen data sets of the simulated town: what they are made of, and whether recordings are those published."""
 
-import importlib.metadata
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import cv2
-import numpy as np
 from pydantic import Field
 
 import semgrid_eval
@@ -17,9 +14,11 @@ from semgrid_eval.files import digest_value, read_json
 from semgrid_eval.frames.synthetic.recordings import Stereo, SyntheticConfig
 from semgrid_eval.frames.synthetic.rendering import RENDER_VERSION
 from semgrid_eval.frames.synthetic.town import TOWN_VERSION
+from semgrid_eval.packages import installed_versions
 
 BENCHMARKS = ("town-v1",)
 SIZES = ("small", "full")
+_PACKAGES = ("numpy", "opencv-python-headless", "eclipse-sumo", "embreex")
 FINGERPRINT_CHARACTERS = 8
 """Of each recording's fingerprint that are published; enough to tell which recordings differ."""
 
@@ -144,8 +143,5 @@ def benchmark_digest(fingerprints: Mapping[str, str]) -> str:
 
 def versions() -> dict[str, str]:
     """Return the versions of what the bytes of a recording depend on, and the processor's kind."""
-    found = {"numpy": np.__version__, "opencv": cv2.__version__, "processor": platform.machine()}
-    found |= {"town builder": str(TOWN_VERSION), "renderer": str(RENDER_VERSION)}
-    for package in ("eclipse-sumo", "embreex"):
-        found[package] = importlib.metadata.version(package)
-    return dict(sorted(found.items()))
+    own = {"processor": platform.machine(), "town builder": str(TOWN_VERSION), "renderer": str(RENDER_VERSION)}
+    return dict(sorted((own | installed_versions(_PACKAGES)).items()))

@@ -199,7 +199,9 @@ def _smooth_field(shape: tuple[int, ...], sigma: float, rng: np.random.Generator
 
 def _threshold(share: float) -> float:
     """Return the value that a Gaussian field exceeds on this share of its area."""
-    return NormalDist().inv_cdf(1.0 - share) if 0.0 < share < 1.0 else _NEVER
+    if share >= 1.0:
+        return -_NEVER
+    return NormalDist().inv_cdf(1.0 - share) if share > 0.0 else _NEVER
 
 
 def _fattened(disparity_px: NDArray[np.float32], share: float, rng: np.random.Generator) -> NDArray[np.float32]:
