@@ -85,7 +85,7 @@ def test_ci_calls_make_test():
 
 
 def test_presets_named_in_the_readme_exist():
-    named = re.search(r"Presets: ([a-z, -]+);", README)
+    named = re.search(r"Presets: ([a-z,\s-]+);", README)
     assert named is not None
     for name in named.group(1).split(","):
         assert load_matrix(name.strip()).rows

@@ -101,9 +101,9 @@ def _hint(contest: Contest, windows: Sequence[Example]) -> str:
         )
     if any(window.hatching for window in windows):
         return (
-            "The frames in the camera image are the sensors. Hatched cells lie on ground that the camera sees and no "
-            "sensor of an input does (taken as flat; walls and vehicles reach into it): what a model says there it "
-            "has learned."
+            "The frames in the camera image are the sensors. Hatched is the ground that the camera sees and no sensor "
+            "of an input does. It is taken as flat, so walls and vehicles may reach into it. What a model says there "
+            "it has learned."
         )
     if any(name != TARGET_SENSOR for name in contest.model.record.sensors) and len(contest.model.record.sensors) > 1:
         return "Each input is seen by several sensors; the target comes from the whole image."

@@ -30,7 +30,7 @@ def test_contests_horizons_and_sensors_are_shown_and_explained(seen):
     assert all(group.problem == "" and group.windows for group in groups)
     assert [group.shown for group in groups] == [True, False, False, False, False]
     assert groups[2].hint.startswith("Each column asks the same model")
-    assert "Hatched cells" in groups[4].hint
+    assert "Hatched is the ground" in groups[4].hint
     assert gaps(rows, groups) == []
 
 
