@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from semgrid_eval.arrays import read_arrays
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file
 from semgrid_eval.report.pictures import grid_png
-from semgrid_eval.scores.results import read_result, read_run, result_folder, windows_file
+from semgrid_eval.scores.results import read_predictions, read_result, read_run, read_windows, result_folder
 
 WINDOWS = 4
 SCALE = 2
@@ -33,8 +32,8 @@ def draw(run: Path, row_name: str) -> Image.Image:
     if row_name not in rows or not rows[row_name].results:
         raise InputError(f"has no finished row {row_name!r}, only {', '.join(rows)}", path=run)
     folder = result_folder(run, rows[row_name].results[0])
-    windows = read_arrays(windows_file(run, read_result(folder).windows_id), ("inputs", "target", "mask"))
-    prediction = read_arrays(folder / "predictions.npz", ("prediction",))["prediction"]
+    windows = read_windows(run, read_result(folder).windows_id)
+    prediction = read_predictions(folder)["prediction"]
     lines = [
         [
             *(tile(grid) for grid in windows["inputs"][n, 0]),

@@ -18,7 +18,6 @@ from semgrid_eval.scores.results import (
     RunRecord,
     read_counts,
     read_history,
-    read_region_counts,
     read_result,
     read_run,
     result_folder,
@@ -118,10 +117,10 @@ def _load_row(run: Path, row: RowRecord, name: str) -> Row:
 
 
 def _load_result(folder: Path) -> Result:
-    record, counts = read_result(folder), read_counts(folder)
+    record, (counts, near) = read_result(folder), read_counts(folder)
     if len(counts) != len(record.windows):
         raise ValueError(f"{folder / 'counts.npz'}: {len(counts)} windows, but result.json has {len(record.windows)}")
     if counts.min(initial=0) < 0 or counts.sum(axis=(1, 2)).max(initial=0) > np.iinfo(np.int32).max // CLASS_COUNT:
         raise ValueError(f"{folder / 'counts.npz'}: counts are negative or beyond any grid")
-    regions = {name: near.astype(np.int32) for name, near in read_region_counts(folder).items()}
+    regions = {name: values.astype(np.int32) for name, values in near.items()}
     return Result(record, counts.astype(np.int32), regions, read_history(folder), folder)

@@ -7,13 +7,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from semgrid_eval.arrays import read_arrays
 from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.report.reading import Row
 from semgrid_eval.scores.calibration import LEVELS, certainty_counts, expected_calibration_error, reliability
 from semgrid_eval.scores.iou import category_iou, class_iou
-from semgrid_eval.scores.results import PREDICTIONS_FILE, windows_file
+from semgrid_eval.scores.results import read_predictions, read_windows
 
 Grid = NDArray[np.uint8]
 Counts = NDArray[np.int64]
@@ -73,8 +72,8 @@ def locate_row(row: Row) -> Where:
         ValueError: their shapes differ.
     """
     result = row.shown
-    shown = read_arrays(windows_file(row.run, result.record.windows_id), ("inputs", "target", "mask"))
-    mine = read_arrays(result.folder / PREDICTIONS_FILE, ("prediction", "certainty"))
+    shown = read_windows(row.run, result.record.windows_id)
+    mine = read_predictions(result.folder)
     inputs, target = np.asarray(shown["inputs"], np.uint8), np.asarray(shown["target"], np.uint8)
     mask = np.asarray(shown["mask"], np.bool_)
     prediction, certainty = (np.asarray(mine[name], np.uint8) for name in ("prediction", "certainty"))

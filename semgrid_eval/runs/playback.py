@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.arrays import read_arrays
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import InputError, LogError, ResultError
 from semgrid_eval.files import atomic_file, write_json
@@ -31,10 +30,11 @@ from semgrid_eval.scores.results import (
     RowRecord,
     RunRecord,
     WindowRecord,
+    read_predictions,
     read_result,
     read_run,
+    read_windows,
     result_folder,
-    windows_file,
 )
 
 RECORD = "semgrid.playback"
@@ -147,11 +147,7 @@ def _read_scored(run: Path, row: RowRecord) -> _Scored:
         raise InputError("none of its results kept its predictions", path=run, field=f"row {row.name}")
     record = read_result(folder)
     grid = parse_config(GridConfig, record.config.get("grid"), path=folder / "result.json")
-    windows = windows_file(run, record.windows_id)
-    arrays = {
-        **read_arrays(folder / PREDICTIONS_FILE, ("prediction", "certainty")),
-        **read_arrays(windows, ("inputs", "target", "mask")),
-    }
+    arrays = read_predictions(folder) | read_windows(run, record.windows_id)
     _check_shapes(arrays, record, row, grid, folder)
     return _Scored(row, record, grid, {name: array.astype(np.uint8) for name, array in arrays.items()})
 

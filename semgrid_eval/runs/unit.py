@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from semgrid_eval.arrays import read_arrays, write_arrays
+from semgrid_eval.arrays import write_arrays
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import atomic_folder, digest_files, digest_value
@@ -177,11 +177,10 @@ class Worker:
             )
 
     def _keep_windows(self, windows: WindowSet, windows_id: str) -> None:
-        path = results.windows_file(self._out, windows_id)
         try:
-            read_arrays(path, ("inputs", "target", "mask"))
+            results.read_windows(self._out, windows_id)
         except ResultError:  # not there yet, or damaged
-            write_arrays(path, window_arrays(windows))
+            write_arrays(results.windows_file(self._out, windows_id), window_arrays(windows))
 
 
 @dataclass(frozen=True)

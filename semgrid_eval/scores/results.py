@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config, parse_config
-from semgrid_eval.errors import ConfigError, InputError, ResultError
+from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import read_json, write_json
 
 FORMAT_VERSION = 1
@@ -159,25 +159,32 @@ def write_result(folder: Path, record: ResultRecord) -> None:
 def is_done(folder: Path, *, with_predictions: bool = False, with_history: bool = False) -> bool:
     """Tell whether a result parses, matches its id, has counts of the right shape, and what else is asked for."""
     try:
-        read_region_counts(folder)
-        count = len(read_result(folder).windows)
+        counts, _ = read_counts(folder)
         if with_predictions:
-            read_arrays(folder / PREDICTIONS_FILE, ("prediction", "certainty"))
-        if with_history and (history := read_history(folder)) is not None and history.empty:
+            read_predictions(folder)
+        if with_history and ((history := read_history(folder)) is None or history.empty):
             return False
-        return len(read_counts(folder)) == count and (not with_history or (folder / HISTORY_FILE).is_file())
-    except (ResultError, ConfigError, InputError, OSError, ValueError):
+        return len(counts) == len(read_result(folder).windows)
+    except (InputError, OSError, ValueError):
         return False
 
 
-def read_counts(folder: Path) -> NDArray[np.int64]:
-    """Read the confusion counts (N, C, C) of a result.
+def read_windows(run: Path, windows_id: str) -> dict[str, NDArray[Any]]:
+    """Read what predictors saw and were scored on: `inputs`, `target` and `mask`.
 
     Raises:
-        ResultError: they are missing or malformed.
+        ResultError: they are missing or damaged.
     """
-    path = folder / "counts.npz"
-    return _checked_counts(read_arrays(path, ("counts",))["counts"], path, "counts")
+    return read_arrays(windows_file(run, windows_id), ("inputs", "target", "mask"))
+
+
+def read_predictions(folder: Path) -> dict[str, NDArray[Any]]:
+    """Read what a result predicted: `prediction` and `certainty`.
+
+    Raises:
+        ResultError: they are missing or damaged.
+    """
+    return read_arrays(folder / PREDICTIONS_FILE, ("prediction", "certainty"))
 
 
 def write_counts(folder: Path, counts: NDArray[np.int64], region_counts: dict[str, NDArray[np.int64]]) -> None:
@@ -186,20 +193,23 @@ def write_counts(folder: Path, counts: NDArray[np.int64], region_counts: dict[st
     write_arrays(folder / "counts.npz", {"counts": counts, **regions})
 
 
-def read_region_counts(folder: Path) -> dict[str, NDArray[np.int64]]:
-    """Read the confusion counts (N, C, C) near `moving` and `standing` actors; empty where no log had the truth.
+def read_counts(folder: Path) -> tuple[NDArray[np.int64], dict[str, NDArray[np.int64]]]:
+    """Read the confusion counts (N, C, C) of a result: of all cells, and near `moving` and `standing` actors.
+
+    The latter are empty where no log had the truth.
 
     Raises:
-        ResultError: they are malformed, or not of as many windows as the counts of all cells.
+        ResultError: they are missing or malformed.
     """
     path = folder / "counts.npz"
     keys = {name: f"counts_{name}" for name in REGIONS}
     found = read_arrays(path, ("counts",), optional=tuple(keys.values()))
+    counts = _checked_counts(found["counts"], path, "counts")
     regions = {name: _checked_counts(found[key], path, key) for name, key in keys.items() if key in found}
-    for name, counts in regions.items():
-        if len(counts) != len(found["counts"]):
-            raise ResultError(f"has {len(counts)} windows, not {len(found['counts'])}", path=path, field=keys[name])
-    return regions
+    for name, near in regions.items():
+        if len(near) != len(counts):
+            raise ResultError(f"has {len(near)} windows, not {len(counts)}", path=path, field=keys[name])
+    return counts, regions
 
 
 def read_history(folder: Path) -> pd.DataFrame | None:

@@ -57,8 +57,8 @@ def kept(run, name):
     row = next(row for row in results.read_run(run).rows if row.name == name)
     folder = results.result_folder(run, row.results[0])
     record = results.read_result(folder)
-    windows = results.read_arrays(results.windows_file(run, record.windows_id), ("inputs", "target", "mask"))
-    return record, {**windows, **results.read_arrays(folder / "predictions.npz", ("prediction", "certainty"))}
+    windows = results.read_windows(run, record.windows_id)
+    return record, {**windows, **results.read_predictions(folder)}
 
 
 def played(path, topic):

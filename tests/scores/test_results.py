@@ -6,7 +6,7 @@ import pytest
 from semgrid_eval.arrays import write_arrays
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import ResultError
-from semgrid_eval.scores.results import read_counts, read_region_counts, write_counts
+from semgrid_eval.scores.results import read_counts, write_counts
 
 
 def counts_of(windows, seed=0):
@@ -16,8 +16,8 @@ def counts_of(windows, seed=0):
 def test_regions_come_back_as_they_were_written(tmp_path):
     regions = {"moving": counts_of(3, 1), "standing": counts_of(3, 2)}
     write_counts(tmp_path, counts_of(3), regions)
-    np.testing.assert_array_equal(read_counts(tmp_path), counts_of(3))
-    found = read_region_counts(tmp_path)
+    everywhere, found = read_counts(tmp_path)
+    np.testing.assert_array_equal(everywhere, counts_of(3))
     assert list(found) == ["moving", "standing"]
     for name, counts in regions.items():
         np.testing.assert_array_equal(found[name], counts)
@@ -25,7 +25,7 @@ def test_regions_come_back_as_they_were_written(tmp_path):
 
 def test_counts_without_the_truth_have_no_regions(tmp_path):
     write_counts(tmp_path, counts_of(2), {})
-    assert read_region_counts(tmp_path) == {}
+    assert read_counts(tmp_path)[1] == {}
 
 
 @pytest.mark.parametrize(
@@ -39,9 +39,9 @@ def test_counts_without_the_truth_have_no_regions(tmp_path):
 def test_malformed_regions_are_named(tmp_path, moving, message):
     write_arrays(tmp_path / "counts.npz", {"counts": counts_of(3), "counts_moving": moving})
     with pytest.raises(ResultError, match=message):
-        read_region_counts(tmp_path)
+        read_counts(tmp_path)
 
 
 def test_missing_counts_are_named(tmp_path):
     with pytest.raises(ResultError, match=r"counts\.npz: cannot be read"):
-        read_region_counts(tmp_path)
+        read_counts(tmp_path)
