@@ -34,6 +34,12 @@ class GridSpec(Config):
             raise ValueError(f"the agent's cell {place} is outside {self.rows} x {self.columns}")
         return self
 
+    def centres_m(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where the cells' centres are from the vehicle: the rows (H,) forward, the columns (W,) left."""
+        forward_m = (self.agent_row - np.arange(self.rows) - 0.5) * self.cell_m
+        left_m = (self.agent_column - np.arange(self.columns) - 0.5) * self.cell_m
+        return forward_m, left_m
+
 
 class Sensor(Config):
     """A rectangle of the camera image that acts as a sensor of its own; pixels of the resized image, end exclusive."""
