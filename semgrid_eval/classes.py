@@ -43,6 +43,7 @@ CLASSES = (
 CLASS_NAMES = tuple(entry.name for entry in CLASSES)
 CLASS_COUNT = len(CLASSES)
 UNKNOWN = CLASS_NAMES.index("unknown")
+KNOWN_IDS = tuple(i for i in range(CLASS_COUNT) if i != UNKNOWN)
 CATEGORY_NAMES = tuple(category.name.lower() for category in Category)
 MASK_COLOUR = (255, 255, 255)
 SAFE_COLOURS = (

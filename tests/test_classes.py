@@ -1,6 +1,7 @@
 from semgrid_eval.classes import (
     CITYSCAPES_LABELS,
     CLASS_NAMES,
+    KNOWN_IDS,
     NO_POINT,
     UNKNOWN,
     category_members,
@@ -59,3 +60,7 @@ def test_priority_ascends_static_small_static_vehicles_small_dynamic():
 def test_every_class_is_in_one_category():
     members = [class_id for classes in category_members().values() for class_id in classes]
     assert sorted(members) == list(range(len(CLASS_NAMES)))
+
+
+def test_known_classes_are_all_but_unknown():
+    assert [CLASS_NAMES[i] for i in KNOWN_IDS] == [name for name in CLASS_NAMES if name != "unknown"]

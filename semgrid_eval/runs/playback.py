@@ -35,6 +35,7 @@ from semgrid_eval.scores.results import (
     read_run,
     read_windows,
     result_folder,
+    scored_digest,
 )
 
 RECORD = "semgrid.playback"
@@ -187,10 +188,9 @@ def _open_drive(record: RunRecord, scored: _Scored, name: str, logs: Path, stack
         raise InputError("is no folder", path=logs)
     path = scored.record.windows[scored.windows_of(name)[0]].log
     log = stack.enter_context(LogReader(logs / path))
-    # A log to train on may have the same path in another folder.
-    known = [entry.digest for entry in record.logs if entry.path == path and entry.digest in scored.record.log_digests]
-    if known and log.digest not in known:
-        raise LogError(f"has digest {log.digest}, and the log that was scored had {known[0]}", path=log.path)
+    known = scored_digest(record, scored.record, path)
+    if known not in (None, log.digest):
+        raise LogError(f"has digest {log.digest}, and the log that was scored had {known}", path=log.path)
     return Drive(log, scored.grid.camera)
 
 

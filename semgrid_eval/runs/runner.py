@@ -263,7 +263,7 @@ def _record(
         machine=machine(worker.device),
         started=started.utc,
         seconds=started.seconds(),
-        logs=tuple(sorted(logs, key=lambda log: log.path)),
+        logs=tuple(sorted(logs, key=lambda log: log.path)),  # under one path, the log to score comes last
         failed_logs=failed | _too_short(outcomes),
         rows=tuple(_row_record(row, matrix.seed, outcomes) for row in matrix.rows),
     )

@@ -114,6 +114,15 @@ def result_folder(run: Path, result_id: str) -> Path:
     return run / "results" / result_id
 
 
+def scored_digest(run: RunRecord, result: ResultRecord, path: str) -> str | None:
+    """Find the digest of the log at a path that a result was scored on, None where the run does not tell.
+
+    A log to train on may have the same path in another folder; of the two, the one to score is recorded last.
+    """
+    found = [log.digest for log in run.logs if log.path == path and log.digest in result.log_digests]
+    return found[-1] if found else None
+
+
 def windows_file(run: Path, windows_id: str) -> Path:
     """Where a set of windows lies."""
     return run / "windows" / f"{windows_id}.npz"

@@ -6,7 +6,7 @@ import pytest
 from semgrid_eval.arrays import write_arrays
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import ResultError
-from semgrid_eval.scores.results import read_counts, write_counts
+from semgrid_eval.scores.results import LogRecord, ResultRecord, RunRecord, read_counts, scored_digest, write_counts
 
 
 def counts_of(windows, seed=0):
@@ -45,3 +45,12 @@ def test_malformed_regions_are_named(tmp_path, moving, message):
 def test_missing_counts_are_named(tmp_path):
     with pytest.raises(ResultError, match=r"counts\.npz: cannot be read"):
         read_counts(tmp_path)
+
+
+@pytest.mark.parametrize(("path", "expected"), [("a.mcap", "scored"), ("b.mcap", "other"), ("c.mcap", None)])
+def test_the_digest_of_a_log_is_that_which_was_scored(path, expected):
+    logs = [("a.mcap", "other"), ("a.mcap", "scored"), ("a.mcap", "trained"), ("b.mcap", "other"), ("c.mcap", "none")]
+    records = tuple(LogRecord(name="", path=p, digest=digest, split="", dataset="") for p, digest in logs)
+    run = RunRecord.model_construct(logs=records)
+    result = ResultRecord.model_construct(log_digests=("other", "scored"))
+    assert scored_digest(run, result, path) == expected
