@@ -6,9 +6,8 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import progress, say
-from semgrid_eval.cli.work import chosen_executor, executor_options
+from semgrid_eval.cli.work import chosen_executor, executor_options, workers_option
 from semgrid_eval.errors import MissingExtraError
-from semgrid_eval.executors import available_cores
 from semgrid_eval.frames.cityscapes import CAMERA_NAME, find_sequences
 from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
 
@@ -73,13 +72,7 @@ def command() -> None:
 )
 @click.option("--train-ids", is_flag=True, help="Label images hold train ids instead of label ids.")
 @click.option("--split", "splits", multiple=True, help="Only this split; may be given several times.")
-@click.option(
-    "--workers",
-    type=click.IntRange(1, 256),
-    default=available_cores(),
-    show_default="all cores",
-    help="Logs at once.",
-)
+@workers_option("Logs at once.")
 @executor_options
 @click.option("--camera-name", default=CAMERA_NAME, show_default=True, help="Name of the camera in the logs.")
 def cityscapes(

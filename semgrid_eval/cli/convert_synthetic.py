@@ -1,7 +1,6 @@
 """`semgrid-eval convert synthetic`: simulated traffic seen by a simulated stereo camera, as logs."""
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any, get_args
 
@@ -9,104 +8,25 @@ import click
 from click.core import ParameterSource
 
 from semgrid_eval.cli.console import progress, say
-from semgrid_eval.cli.work import chosen_executor, executor_options
+from semgrid_eval.cli.convert import show
+from semgrid_eval.cli.work import chosen_executor, executor_options, workers_option
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
-from semgrid_eval.executors import Executor, available_cores, local_executor
 from semgrid_eval.frames.synthetic.benchmark import (
     BENCHMARKS,
     SIZES,
     Benchmark,
     Comparison,
     SizeName,
-    compare,
+    changed_versions,
     load_benchmark,
-    versions,
 )
-from semgrid_eval.frames.synthetic.recordings import (
-    RecordingPlan,
-    Stereo,
-    SyntheticConfig,
-    plan_recordings,
-    render_recording,
-)
-from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
-from semgrid_eval.log.fingerprint import fingerprints
-from semgrid_eval.log.store import SUFFIX, find_logs
+from semgrid_eval.frames.synthetic.recordings import Stereo, SyntheticConfig
+from semgrid_eval.log.convert import ConversionSummary
+from semgrid_eval.log.town import convert_benchmark, convert_town, strays
 
 _Command = Callable[..., Any]
-_CACHE = ".towns"
 _DEFAULTS = {name: field.default for name, field in SyntheticConfig.model_fields.items()}
-
-
-def convert(
-    out: Path,
-    *,
-    workers: int,
-    cache: Path | None = None,
-    executor: Executor | None = None,
-    **options: Any,  # noqa: ANN401
-) -> ConversionSummary:
-    """Simulate towns, draw recordings from them and write their logs; what is there already is kept.
-
-    Args:
-        out: folder of the logs; `cache` is a folder inside it unless given.
-        workers: processes at once.
-        cache: where towns are kept.
-        executor: renders the recordings; by default those processes.
-        options: fields of `SyntheticConfig`.
-
-    Raises:
-        ConfigError: an option is unknown or impossible.
-        InputError: SUMO failed, or a folder cannot be written to.
-        MissingExtraError: SUMO or Embree is not installed.
-    """
-    config = parse_config(SyntheticConfig, options)
-    with progress("simulate") as watch:
-        plans = plan_recordings(config, cache or out / _CACHE, watch, workers=workers)
-    return _render(plans, out, executor or local_executor(workers))
-
-
-def convert_benchmark(
-    out: Path,
-    benchmark: Benchmark,
-    size: SizeName,
-    *,
-    workers: int,
-    cache: Path | None = None,
-    executor: Executor | None = None,
-) -> tuple[ConversionSummary, Comparison | None]:
-    """Write the logs of a frozen benchmark and hold them against the published ones.
-
-    Args:
-        out: folder of the logs; `cache` is a folder inside it unless given.
-        benchmark: its definition.
-        size: of the benchmark.
-        workers: processes at once.
-        cache: where towns are kept.
-        executor: renders the recordings; by default those processes.
-
-    Raises:
-        InputError: SUMO failed, a folder cannot be written to, or a log cannot be read again.
-        MissingExtraError: SUMO or Embree is not installed.
-    """
-    with progress("simulate") as watch:
-        plans = plan_recordings(
-            benchmark.config(size), cache or out / _CACHE, watch, workers=workers, dataset=benchmark.dataset(size)
-        )
-    summary = _render(plans, out, executor or local_executor(workers))
-    if summary.failed:
-        return summary, None
-    labels = sorted(summary.written + summary.skipped)
-    with progress("compare") as watch:
-        found = fingerprints([out / f"{x}{SUFFIX}" for x in labels], executor=local_executor(workers), progress=watch)
-    return summary, compare(benchmark.sizes[size], dict(zip(labels, found, strict=True)))
-
-
-def _render(plans: list[RecordingPlan], out: Path, executor: Executor) -> ConversionSummary:
-    jobs = [ConversionJob(plan.name, plan.split, plan.digest, partial(render_recording, plan)) for plan in plans]
-    with progress("render") as watch:
-        return convert_recordings(jobs, out, executor=executor, progress=watch)
 
 
 def _option(name: str, kind: "type | click.Choice[str]", text: str) -> Callable[[_Command], _Command]:
@@ -135,9 +55,7 @@ def _option(name: str, kind: "type | click.Choice[str]", text: str) -> Callable[
 @click.option(
     "--cache", type=click.Path(path_type=Path, file_okay=False), help="Folder of towns.  [default: OUT/.towns]"
 )
-@click.option(
-    "--workers", type=click.IntRange(1, 256), default=available_cores(), show_default="all cores", help="Processes."
-)
+@workers_option("Processes.")
 @executor_options
 @click.pass_context
 def synthetic(
@@ -161,34 +79,32 @@ def synthetic(
     --benchmark town-v1 makes a data set that is the same everywhere: 300 recordings for training and 120 for
     validation, or 2,975 and 500 with --size full. Its last line says whether every recording is the published one.
     """
-    from semgrid_eval.cli.convert import show
-
     given = [name for name in options if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
     if benchmark is None:
         if context.get_parameter_source("size") is ParameterSource.COMMANDLINE:
             raise ConfigError("is the size of a benchmark; name one with --benchmark", field="--size")
         if options["recordings"] is None:
             raise click.UsageError("Missing option '--recordings', or '--benchmark'.", context)
-        work_on = chosen_executor(executor, address, workers)
-        return show(convert(out, workers=workers, cache=cache, executor=work_on, **options), out)
+        config, work_on = parse_config(SyntheticConfig, options), chosen_executor(executor, address, workers)
+        return show(convert_town(config, out, workers=workers, cache=cache, executor=work_on, stage=progress), out)
     if given:
         raise ConfigError(f"is fixed by --benchmark {benchmark}; leave it out", field=f"--{given[0].replace('_', '-')}")
     frozen, work_on = load_benchmark(benchmark), chosen_executor(executor, address, workers)
-    summary, comparison = convert_benchmark(out, frozen, size, workers=workers, cache=cache, executor=work_on)
+    summary, comparison = convert_benchmark(
+        frozen, size, out, workers=workers, cache=cache, executor=work_on, stage=progress
+    )
     return _show_benchmark(out, frozen, size, summary, comparison)
 
 
 def _show_benchmark(
     out: Path, benchmark: Benchmark, size: SizeName, summary: ConversionSummary, comparison: Comparison | None
 ) -> int:
-    from semgrid_eval.cli.convert import show
-
     code = show(summary, out)
-    known = set(summary.written + summary.skipped + list(summary.failed))
-    strays = [log for log in find_logs(out) if log.relative_to(out).with_suffix("").as_posix() not in known]
-    if strays:
-        say(f"Warning: {out} holds {len(strays)} logs that do not belong to the benchmark, such as {strays[0]}")
-    say(_verdict(f"{benchmark.name} {size}", comparison, len(known), benchmark.sizes[size].versions))
+    others = strays(out, summary)
+    if others:
+        say(f"Warning: {out} holds {len(others)} logs that do not belong to the benchmark, such as {others[0]}")
+    total = len(summary.written) + len(summary.skipped) + len(summary.failed)
+    say(_verdict(f"{benchmark.name} {size}", comparison, total, benchmark.sizes[size].versions))
     return code
 
 
@@ -200,13 +116,8 @@ def _verdict(name: str, comparison: Comparison | None, total: int, made_with: di
         return f"{name}: digest {comparison.digest}; nothing is published yet to compare it with"
     if comparison.digest == comparison.published:
         return f"{name}: digest {comparison.digest}, as published"
-    here = versions()
-    others = [
-        f"{what} {made_with[what]} (here {here.get(what)})" for what in made_with if here.get(what) != made_with[what]
-    ]
-    why = (
-        f"published were made with {', '.join(others)}" if others else "the versions are the same, so processors differ"
-    )
+    others = ", ".join(f"{what} {theirs} (here {ours})" for what, (theirs, ours) in changed_versions(made_with).items())
+    why = f"published were made with {others}" if others else "the versions are the same, so processors differ"
     return (
         f"Warning: {name}: {len(comparison.differing)} of {total} recordings differ from the published ones, such as "
         f"{comparison.differing[0]}; digest {comparison.digest}, published {comparison.published}; {why}"

@@ -6,7 +6,8 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
-from semgrid_eval.executors import available_cores, local_executor
+from semgrid_eval.cli.work import device_option, workers_option
+from semgrid_eval.executors import local_executor
 
 PRESET = "demo"
 TOWNS = 8
@@ -17,33 +18,29 @@ TOWNS = 8
 @click.option("--out", default="demo", show_default=True, type=click.Path(path_type=Path, file_okay=False))
 @click.option("--recordings", type=click.IntRange(4, 10_000), default=96, show_default=True, help="Drives to simulate.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
-@click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
-@click.option(
-    "--workers",
-    type=click.IntRange(1, 256),
-    default=available_cores(),
-    show_default="all cores",
-    help="Processes at once.",
-)
+@device_option
+@workers_option("Processes at once.")
 def command(out: Path, recordings: int, seed: int, device: str, workers: int) -> int:
     """Simulate a town, record drives through it as logs, train, score and report: a few minutes on two cores.
 
     Prints the path of the finished page. What is done already is kept, so the same command goes on after a stop.
     """
-    from semgrid_eval.cli.convert_synthetic import convert
+    from semgrid_eval.cli.convert import show
+    from semgrid_eval.cli.run import show_run
+    from semgrid_eval.frames.synthetic.recordings import SyntheticConfig
+    from semgrid_eval.log.town import convert_town
     from semgrid_eval.report.page import write_report
     from semgrid_eval.runs.matrix import load_matrix
     from semgrid_eval.runs.runner import RunOptions, run_matrix
 
     start_s = time.monotonic()
     logs, run = out / "logs", out / "run"
-    summary = convert(logs, recordings=recordings, seed=seed, towns=TOWNS, workers=workers)
+    config = SyntheticConfig(recordings=recordings, seed=seed, towns=TOWNS)
+    code = show(convert_town(config, logs, workers=workers, stage=progress), logs)
     options = RunOptions(device, out / "grids", command_line(), grid_executor=local_executor(workers))
     record = run_matrix(load_matrix(PRESET), logs, run, options, stage=progress)
     page = write_report(run)
-    for row in record.rows:
-        if row.failure:
-            say(f"Error: row {row.name}: {row.failure}")
+    code |= show_run(record, {row.name for row in record.rows})
     say(f"Finished in {time.monotonic() - start_s:.0f} s. Open this page in a browser:")
     click.echo(page)
-    return 1 if summary.failed or record.failed_logs or any(row.failure for row in record.rows) else 0
+    return code

@@ -5,18 +5,15 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import progress, say
-from semgrid_eval.cli.work import chosen_executor, executor_options
+from semgrid_eval.cli.work import chosen_executor, executor_options, workers_option
 from semgrid_eval.config import load_yaml, parse_config
-from semgrid_eval.executors import available_cores
 
 
 @click.command("grids", epilog="Example: semgrid-eval grids logs grids")
 @click.argument("logs", type=click.Path(path_type=Path, exists=True))
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
 @click.option("--config", type=click.Path(path_type=Path, dir_okay=False), help="Grid configuration (YAML).")
-@click.option(
-    "--workers", type=click.IntRange(1, 256), default=available_cores(), show_default="all cores", help="Logs at once."
-)
+@workers_option("Logs at once.")
 @executor_options
 def command(logs: Path, out: Path, config: Path | None, workers: int, executor: str, address: str) -> int:
     """Build the semantic grids of all LOGS into the folder OUT.

@@ -1,17 +1,20 @@
 """`semgrid-eval run`: work off an experiment matrix."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
-from semgrid_eval.cli.work import LOCAL, chosen_executor, executor_options
-from semgrid_eval.executors import available_cores, local_executor
+from semgrid_eval.cli.work import chosen_executor, device_option, executor_options, workers_option
+from semgrid_eval.executors import local_executor
+from semgrid_eval.runs.executors import LOCAL
 
 if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.runs.matrix import Matrix
     from semgrid_eval.runs.runner import RunOptions
+    from semgrid_eval.scores.results import RunRecord
 
 
 @click.command("run", epilog="Example: semgrid-eval run baselines --logs logs --out runs/first")
@@ -33,15 +36,9 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     "--model", "models", multiple=True, help="One more row: a model of your own, path.py:Class, or an installed one."
 )
 @click.option("--row", "only", multiple=True, help="Only this row, or rows like 'BL-*'; may be repeated.")
-@click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
+@device_option
 @click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Rows trained at once.")
-@click.option(
-    "--workers",
-    type=click.IntRange(1, 256),
-    default=available_cores(),
-    show_default="all cores",
-    help="Logs made into grids at once.",
-)
+@workers_option("Logs made into grids at once.")
 @executor_options
 @click.option("--gpus", type=click.FloatRange(0), default=0.0, help="With Ray: GPUs for each row; fractions share one.")
 @click.option(
@@ -102,13 +99,18 @@ def command(
     if dry_run:
         return _show_plan(resolved, logs, out, options)
     record = run_matrix(resolved, logs, out, options, stage=progress)
-    wanted = {row.name for row in wanted_rows(resolved, only)}
-    failed = [row for row in record.rows if row.failure and row.name in wanted]
+    code = show_run(record, {row.name for row in wanted_rows(resolved, only)})
+    click.echo(out)
+    return code
+
+
+def show_run(record: "RunRecord", rows: Collection[str]) -> int:
+    """Print which of the named rows and which logs failed, and return the exit code."""
+    failed = [row for row in record.rows if row.failure and row.name in rows]
     for row in failed:
         say(f"Error: row {row.name}: {row.failure}")
     for reason in record.failed_logs.values():
         say(f"Error: {reason}")
-    click.echo(out)
     return 1 if record.failed_logs or failed else 0
 
 

@@ -5,11 +5,19 @@ from typing import Any, TypeVar
 
 import click
 
-from semgrid_eval.executors import Executor, local_executor
-
-LOCAL = "local"
+from semgrid_eval.executors import Executor, available_cores, local_executor
+from semgrid_eval.runs.executors import LOCAL, RayExecutor
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def workers_option(text: str) -> Callable[[Command], Command]:
+    """Return the option --workers, which is all cores unless given."""
+    kind = click.IntRange(1, 256)
+    return click.option("--workers", type=kind, default=available_cores(), show_default="all cores", help=text)
+
+
+device_option = click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 
 
 def executor_options(command: Command) -> Command:
@@ -39,6 +47,4 @@ def chosen_executor(
     """
     if name == LOCAL:
         return local_executor(workers, gpus=shared)
-    from semgrid_eval.runs.executors import RayExecutor
-
     return RayExecutor(address, gpus=gpus, local_cpus=workers if address == LOCAL else None)

@@ -4,7 +4,7 @@ import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
@@ -17,12 +17,12 @@ from semgrid_eval.frames.synthetic.town import TOWN_VERSION
 from semgrid_eval.packages import installed_versions
 
 BENCHMARKS = ("town-v1",)
-SIZES = ("small", "full")
 _PACKAGES = ("numpy", "opencv-python-headless", "eclipse-sumo", "embreex")
 FINGERPRINT_CHARACTERS = 8
 """Of each recording's fingerprint that are published; enough to tell which recordings differ."""
 
 SizeName = Literal["small", "full"]
+SIZES: tuple[SizeName, ...] = get_args(SizeName)
 
 
 class SplitSize(Config):
@@ -138,7 +138,13 @@ def short_fingerprints(found: Mapping[str, str]) -> dict[str, str]:
 
 def benchmark_digest(fingerprints: Mapping[str, str]) -> str:
     """Digest the fingerprints of all recordings by split and name: the digest of a benchmark (16 characters)."""
-    return digest_value({label: value[:FINGERPRINT_CHARACTERS] for label, value in fingerprints.items()})
+    return digest_value(short_fingerprints(fingerprints))
+
+
+def changed_versions(made_with: Mapping[str, str]) -> dict[str, tuple[str, str | None]]:
+    """Return what published recordings were made with and what is here instead, None where nothing is."""
+    here = versions()
+    return {what: (theirs, here.get(what)) for what, theirs in made_with.items() if here.get(what) != theirs}
 
 
 def versions() -> dict[str, str]:
