@@ -1,6 +1,7 @@
 """Experiment matrices: YAML files of rows, with defaults and axes, resolved into complete rows."""
 
 import itertools
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from importlib import resources
 from pathlib import Path
@@ -71,9 +72,9 @@ class Row(Config):
         for sensor in self.sensors:
             if sensor not in known:
                 raise ValueError(f"sensor {sensor!r} is not one of {', '.join(known)}")
-        models = (TRAINED_MODEL, *BASELINES, *installed_models())
-        if ":" not in self.model and self.model not in models:
-            raise ValueError(f"model {self.model!r} is not one of {', '.join(models)} or path.py:Class")
+        if not self.built_in and ":" not in self.model and self.model not in (installed := installed_models()):
+            models = ", ".join((TRAINED_MODEL, *BASELINES, *installed))
+            raise ValueError(f"model {self.model!r} is not one of {models} or path.py:Class")
         if self.scored_window.inputs != self.window.inputs:
             raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
         if self.model == "overlay" and any(sum(end in name for name in self.sensors) != 1 for end in _ENDS):
@@ -84,6 +85,11 @@ class Row(Config):
     def trained(self) -> bool:
         """Whether the row has weights to learn."""
         return self.model == TRAINED_MODEL
+
+    @property
+    def built_in(self) -> bool:
+        """Whether the row's model comes with this package."""
+        return self.trained or self.model in BASELINES
 
     @property
     def group(self) -> str:
@@ -222,10 +228,9 @@ def _resolve(file: _MatrixFile, path: Path) -> Matrix:
     rows = [parse_config(Row, row, path=f"{path}: {place}") for place, row in _expanded(file, path)]
     if not rows:
         raise ConfigError("there is no row", path=path, field="rows")
-    names = [row.name for row in rows]
-    for name in names:
-        if names.count(name) > 1:
-            raise ConfigError(f"{name!r} is the name of {names.count(name)} rows", path=path, field="rows.name")
+    name, count = Counter(row.name for row in rows).most_common(1)[0]
+    if count > 1:
+        raise ConfigError(f"{name!r} is the name of {count} rows", path=path, field="rows.name")
     return Matrix(title=file.title or path.stem, seed=file.seed or 0, rows=tuple(rows))
 
 

@@ -224,12 +224,12 @@ def identity(row: Row) -> dict[str, object]:
 
 
 def _config(row: Row) -> dict[str, object]:
-    """Return a row's identity and, for a model of one's own, the digest of its code."""
-    if ":" in row.model:
-        return {**identity(row), "code": digest_files([Path(row.model.rpartition(":")[0])])}
-    if row.model in installed_models():
-        return {**identity(row), "code": installed_models()[row.model]}
-    return identity(row)
+    """Return a row's identity and, for a model of one's own, the digest of its code, or its package and version."""
+    if row.built_in:
+        return identity(row)
+    path, separator, _ = row.model.rpartition(":")
+    code = digest_files([Path(path)]) if separator else installed_models().get(row.model)
+    return {**identity(row), "code": code}
 
 
 def _predictor(row: Row, trained: Trained | None, counted: WindowSet | None) -> Predictor:

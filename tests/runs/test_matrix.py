@@ -1,10 +1,12 @@
 import csv
+import importlib.metadata
 from importlib import resources
 
 import pytest
 import yaml
 
 from semgrid_eval.errors import ConfigError
+from semgrid_eval.models.predictor import ENTRY_POINT_GROUP
 from semgrid_eval.runs.matrix import load_matrix, preset_names
 
 SCALED = ("paper-cpu", "architecture-cpu", "sensitivity")
@@ -108,6 +110,22 @@ def test_models_of_ones_own_are_rows_with_the_matrix_s_defaults(tmp_path):
     ]
     with pytest.raises(ConfigError, match="'de' is not one of"):
         load_matrix("smoke", models=["de"])
+
+
+def test_an_installed_model_is_a_row_and_is_looked_for_only_where_one_is_asked_for(tmp_path, monkeypatch):
+    looked_for = []
+
+    def entry_points(*, group):
+        looked_for.append(group)
+        return importlib.metadata.EntryPoints([importlib.metadata.EntryPoint("mine", "package:Mine", group)])
+
+    monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
+    load_matrix("paper", models=["mine.py:Mine"])
+    assert looked_for == []
+    assert load(tmp_path, {"rows": [{"name": "a", "model": "mine"}]}).rows[0].model == "mine"
+    assert set(looked_for) == {ENTRY_POINT_GROUP}
+    with pytest.raises(ConfigError, match=r"'yours' is not one of ed, .*, mine or path\.py:Class"):
+        load(tmp_path, {"rows": [{"name": "a", "model": "yours"}]})
 
 
 def test_a_name_that_is_neither_file_nor_preset_lists_the_presets():

@@ -1,4 +1,5 @@
 import dataclasses
+import importlib.metadata
 import json
 import re
 import shutil
@@ -14,6 +15,7 @@ from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.executors import InProcess, Processes
 from semgrid_eval.frames.types import Actor, Pose
 from semgrid_eval.log.store import write_log
+from semgrid_eval.models.predictor import ENTRY_POINT_GROUP
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores import results
@@ -146,6 +148,20 @@ def test_a_model_of_ones_own_is_scored_like_any_other(logs, tmp_path):
     rows = [{"name": "mine", "model": f"{tmp_path}/mine.py:Newest"}, {"name": "BL-DC", "model": "newest"}]
     record = run(rows, logs, tmp_path / "run")
     assert score(tmp_path / "run", record, "mine") == score(tmp_path / "run", record, "BL-DC")
+
+
+def test_an_installed_model_is_scored_and_its_package_is_part_of_the_record(logs, tmp_path, monkeypatch):
+    value = "semgrid_eval.models.baselines:RepeatNewest"
+    found = [importlib.metadata.EntryPoint(name, value, ENTRY_POINT_GROUP) for name in ("mine", "newest")]
+    monkeypatch.setattr(
+        importlib.metadata, "entry_points", lambda *, group: importlib.metadata.EntryPoints(found).select(group=group)
+    )
+    record = run([{"name": "mine", "model": "mine"}, {"name": "BL-DC", "model": "newest"}], logs, tmp_path / "run")
+    assert score(tmp_path / "run", record, "mine") == score(tmp_path / "run", record, "BL-DC")
+    configs = [
+        results.read_result(results.result_folder(tmp_path / "run", row.results[0])).config for row in record.rows
+    ]
+    assert [config.get("code") for config in configs] == ["", None]  # a package that is not known; one that is ours
 
 
 def test_a_counted_table_is_told_apart_by_what_it_was_counted_on(logs, tmp_path):
