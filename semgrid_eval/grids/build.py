@@ -118,7 +118,7 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
         LogError: the log is damaged or lacks what a grid needs.
     """
     with closing(LogReader(log)) as reader:
-        camera = _camera(reader, config.camera, log)
+        camera = reader.choose_camera(config.camera)
         motion = list(reader.motion())
         frames = reader.frames(camera)
         truth = TrueActors(reader, config.spec)
@@ -191,15 +191,6 @@ def _take(frames: Iterator[CameraFrame], count: int) -> Iterator[CameraFrame]:
 def _resize(image: NDArray[np.uint8] | NDArray[np.uint16], width: int, height: int) -> NDArray[np.generic]:
     rows, columns = nearest_indices(image.shape[0], height), nearest_indices(image.shape[1], width)
     return image[rows[:, None], columns[None, :]]
-
-
-def _camera(reader: LogReader, wanted: str | None, log: Path) -> str:
-    cameras = reader.scene.cameras
-    if wanted is None and len(cameras) == 1:
-        return cameras[0]
-    if wanted in cameras:
-        return str(wanted)
-    raise LogError(f"camera {wanted or '(not given)'} is not one of: {', '.join(cameras)}", path=log, field="camera")
 
 
 def _build_and_keep(log: Path, folder: Path, config: GridConfig) -> str | None:

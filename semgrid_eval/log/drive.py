@@ -42,20 +42,11 @@ class Drive:
 
     def __init__(self, log: LogReader, camera: str | None = None) -> None:
         self.cameras = log.scene.cameras
-        chosen = self.cameras[0] if camera is None and len(self.cameras) == 1 else camera
-        if chosen not in self.cameras:
-            raise LogError(
-                f"{camera or '(not given)'} is not one of: {', '.join(self.cameras)}", path=log.path, field="camera"
-            )
+        chosen = log.choose_camera(camera)
         self._log = log
         self._calibrations = {name: log.calibration(name) for name in self.cameras}
-        self._poses = tuple(_poses(log, camera_topic(chosen, topics.DISPARITY)))
+        self._poses = drive_poses(log, chosen)
         self._frames = {pose.stamp_ns: frame for frame, pose in enumerate(self._poses)}
-
-    @property
-    def poses(self) -> tuple[Pose, ...]:
-        """Where the vehicle is at each frame, in the odom frame."""
-        return self._poses
 
     def frame_at(self, stamp_ns: int) -> int:
         """Return the index of the frame of a time.
@@ -118,11 +109,17 @@ class Drive:
         return header.width, header.height
 
 
-def _poses(log: LogReader, topic: str) -> Iterator[Pose]:
-    """Give the pose in the odom frame at every message of a topic, from the motion known by then."""
+def drive_poses(log: LogReader, camera: str) -> list[Pose]:
+    """Return the vehicle's pose in the odom frame at each frame of a camera, from the motion known by then.
+
+    Raises:
+        LogError: what is read is damaged.
+    """
+    poses: list[Pose] = []
     reckoning, samples, known = DeadReckoning(), log.motion(), 0
-    for _, stamp_ns, _ in log.messages([topic]):
+    for _, stamp_ns, _ in log.messages([camera_topic(camera, topics.DISPARITY)]):
         while known < len(samples) and samples[known].stamp_ns <= stamp_ns:
             reckoning.add(samples[known])
             known += 1
-        yield reckoning.pose_at(stamp_ns)
+        poses.append(reckoning.pose_at(stamp_ns))
+    return poses

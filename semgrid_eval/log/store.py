@@ -131,6 +131,19 @@ class LogReader:
         """When the log begins: the time of its first message, 0 where it has none."""
         return min((index.message_start_time for index in self._container.summary.chunk_indexes), default=0)
 
+    def choose_camera(self, wanted: str | None) -> str:
+        """Return the camera that is wanted, or the log's only one where none is.
+
+        Raises:
+            LogError: there is no such camera, or there are several and none is wanted.
+        """
+        cameras = self.scene.cameras
+        chosen = cameras[0] if wanted is None and len(cameras) == 1 else wanted
+        if chosen not in cameras:
+            known = ", ".join(cameras)
+            raise LogError(f"{wanted or '(not given)'} is not one of: {known}", path=self.path, field="camera")
+        return chosen
+
     def verify(self) -> None:
         """Hold the checksum of everything in the file against its bytes.
 
@@ -174,7 +187,7 @@ class LogReader:
         Raises:
             LogError: there is no such camera, or its calibration is damaged or impossible.
         """
-        self._require_camera(camera)
+        self.choose_camera(camera)
         known = self._first(camera_topic(camera, topics.CALIBRATION))
         rest = self._first(camera_topic(camera, topics.STEREO))
         try:
@@ -226,7 +239,7 @@ class LogReader:
         Raises:
             LogError: there is no such camera, or what is read is damaged.
         """
-        self._require_camera(camera)
+        self.choose_camera(camera)
         fields = {camera_topic(camera, channel): field for field, (channel, _) in topics.PICTURES.items()}
         if not images:
             del fields[camera_topic(camera, topics.IMAGE)]
@@ -252,10 +265,6 @@ class LogReader:
             LogError: one is damaged.
         """
         return self._container.attachments()
-
-    def _require_camera(self, camera: str) -> None:
-        if camera not in self.scene.cameras:
-            raise LogError(f"{camera} is not one of: {', '.join(self.scene.cameras)}", path=self.path, field="camera")
 
     def _topic(self, entry: Entry) -> str:
         return self._container.summary.channels[entry.channel_id].topic

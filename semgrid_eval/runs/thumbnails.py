@@ -14,7 +14,7 @@ from semgrid_eval.frames.png import decode_colour, decode_ids, encode_gray, read
 from semgrid_eval.grids.geometry import nearest_indices, unit_projection
 from semgrid_eval.log import topics
 from semgrid_eval.log.container import damage_as_log_error
-from semgrid_eval.log.drive import Drive as LoggedDrive
+from semgrid_eval.log.drive import drive_poses
 from semgrid_eval.log.moments import read_picture
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.log.topics import camera_topic
@@ -82,7 +82,7 @@ def log_pictures(log: Path, digest: str, camera: str | None, stamps_ns: Iterable
     with LogReader(log) as reader:
         if reader.digest != digest:
             raise LogError(f"has digest {reader.digest}, not {digest}", path=log)
-        name = camera or reader.scene.cameras[0]
+        name = reader.choose_camera(camera)
         drive = _drive(reader, name)
         channels = {camera_topic(name, topics.IMAGE): "image", camera_topic(name, topics.LABEL): "label"}
         for topic, stamp_ns, data in reader.messages(channels):
@@ -125,7 +125,7 @@ def _small_size(height: int, width: int) -> tuple[int, int]:
 
 
 def _drive(reader: LogReader, camera: str) -> Drive:
-    poses = LoggedDrive(reader, camera).poses
+    poses = drive_poses(reader, camera)
     _, _, first = next(reader.messages([camera_topic(camera, topics.DISPARITY)]))
     with damage_as_log_error(reader.path):
         header = read_header(read_picture(first))

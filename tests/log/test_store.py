@@ -107,6 +107,15 @@ def test_digest_is_that_of_the_content(log, tmp_path):
     assert len({log.digest, digests["shorter"], digests["other"]}) == 3
 
 
+def test_a_logs_only_camera_need_not_be_named(log, tmp_path):
+    assert log.choose_camera(None) == log.choose_camera("front") == "front"
+    write_log(driving(cameras=("rear", "front")), tmp_path / "two.mcap")
+    with LogReader(tmp_path / "two.mcap") as two:
+        assert two.choose_camera("rear") == "rear"
+        with pytest.raises(LogError, match=r"two\.mcap: camera: \(not given\) is not one of: front, rear"):
+            two.choose_camera(None)
+
+
 def test_several_cameras_stay_apart(tmp_path):
     write_log(driving(cameras=("rear", "front")), tmp_path / "two.mcap")
     with LogReader(tmp_path / "two.mcap") as log:
