@@ -10,7 +10,7 @@ REFERENCE_REPORT ?= reports/reference
 REFERENCE_LOGS ?= convert synthetic $(REFERENCE)/logs --benchmark town-v1 --size small
 REFERENCE_MATRIX ?= paper-cpu
 REFERENCE_COMMANDS := "$(REFERENCE_LOGS)" \
-  "run $(REFERENCE_MATRIX) --logs $(REFERENCE)/logs --out $(REFERENCE)/run" \
+  "run $(REFERENCE_MATRIX) --logs $(REFERENCE)/logs --out $(REFERENCE)/run --jobs 2" \
   "report $(REFERENCE)/run --out $(REFERENCE_REPORT)"
 
 .PHONY: demo test check reference clean
