@@ -45,8 +45,7 @@ def blind_cells(drive: Drive, grid: GridConfig, sensors: Sequence[str], window: 
 
 def _cell_centres_odom(spec: GridSpec, pose: NDArray[np.float64], yaw_rad: float) -> NDArray[np.float64]:
     """Give the centres of the cells of a grid around a pose, in the odom frame: (H, W, 2)."""
-    forward_m = (spec.agent_row - np.arange(spec.rows) - 0.5)[:, None] * spec.cell_m
-    left_m = (spec.agent_column - np.arange(spec.columns) - 0.5)[None, :] * spec.cell_m
+    forward_m, left_m = np.meshgrid(*spec.centres_m(), indexing="ij")
     cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
     x_m, y_m = cosine * forward_m - sine * left_m, sine * forward_m + cosine * left_m
     return np.stack([x_m, y_m], axis=-1) + pose[:2]

@@ -7,9 +7,7 @@ from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 
-from semgrid_eval.config import parse_config
-from semgrid_eval.errors import ConfigError, ResultError
-from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.errors import ResultError
 from semgrid_eval.report.reading import Result, Row
 from semgrid_eval.scores.pictures import LogPictures, pictures_file, read_pictures
 from semgrid_eval.scores.results import WindowRecord, read_run
@@ -32,11 +30,11 @@ class Glimpses:
         self._digests = {(log.path, log.digest) for log in record.logs}
         self._read = lru_cache(_LOGS_KEPT)(self._read_log)
 
-    def of(self, log: str, result: Result, grid: GridConfig | None) -> LogPictures | None:
+    def of(self, log: str, result: Result) -> LogPictures | None:
         """Return what was kept of a log that a result is scored on, None where that is nothing that can be read."""
         # A log to train on may have the same path in another folder.
         digest = next((digest for digest in result.record.log_digests if (log, digest) in self._digests), None)
-        return None if digest is None else self._read(digest, grid.camera if grid is not None else None)
+        return None if digest is None else self._read(digest, result.grid.camera if result.grid is not None else None)
 
     def play_command(self, row: Row, window: WindowRecord) -> str:
         """Write the command that plays a window's recording, with the folders that the run's own command names."""
@@ -50,14 +48,6 @@ class Glimpses:
             return read_pictures(pictures_file(self._run, digest, camera))
         except ResultError:
             return None
-
-
-def grid_config(result: Result) -> GridConfig | None:
-    """Return how a result's grids were made, None where it does not tell."""
-    try:
-        return parse_config(GridConfig, result.record.config["grid"])
-    except (KeyError, ConfigError):
-        return None
 
 
 def times(stamp_ns: int, kept: LogPictures | None) -> tuple[str, ...]:

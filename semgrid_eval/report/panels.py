@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from semgrid_eval.arrays import read_arrays
 from semgrid_eval.report.cells import ABSENT, number, signed
 from semgrid_eval.report.examples import Contest, Pick, by_window, key_of, mean_iou, positions
-from semgrid_eval.report.glimpses import Glimpses, grid_config, times
+from semgrid_eval.report.glimpses import Glimpses, times
 from semgrid_eval.report.pictures import (
     HATCHED,
     LEGEND,
@@ -89,12 +89,11 @@ def draw_examples(contest: Contest, picks: Sequence[Pick], glimpses: Glimpses) -
     """
     groups = by_window(picks)
     result, at = contest.result, [group[0].index for group in groups]
-    grid = grid_config(result)
     shown = _Shown(contest, at)
     for i, group in enumerate(groups):
         window = result.record.windows[at[i]]
-        kept = glimpses.of(window.log, result, grid)
-        view = View(window, kept, grid, contest.model.record.sensors)
+        kept = glimpses.of(window.log, result)
+        view = View(window, kept, result.grid, contest.model.record.sensors)
         film = tuple(shown.film(i, view))
         answers = tuple(shown.answers(i))
         hatching = view.hatching

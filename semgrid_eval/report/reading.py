@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.errors import SemgridError
+from semgrid_eval.config import parse_config
+from semgrid_eval.errors import ConfigError, SemgridError
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores.results import (
     PREDICTIONS_FILE,
@@ -36,6 +39,14 @@ class Result:
     regions: Mapping[str, NDArray[np.int32]]
     history: pd.DataFrame | None
     folder: Path
+
+    @cached_property
+    def grid(self) -> GridConfig | None:
+        """How its grids were made, None where it does not tell."""
+        try:
+            return parse_config(GridConfig, self.record.config["grid"])
+        except (KeyError, ConfigError):
+            return None
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
 from semgrid_eval.errors import SemgridError
+from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.report.reading import Row
 from semgrid_eval.scores.calibration import LEVELS, certainty_counts, expected_calibration_error, reliability
 from semgrid_eval.scores.iou import category_iou, class_iou
@@ -17,7 +18,6 @@ from semgrid_eval.scores.results import read_predictions, read_windows
 Grid = NDArray[np.uint8]
 Counts = NDArray[np.int64]
 
-GRID_SIDE_M = 100.0
 BAND_EDGES_M = (20.0, 40.0, 60.0)
 BANDS = ("0 to 20 m", "20 to 40 m", "40 to 60 m", "beyond 60 m")
 ORIGINS = ("in the newest input", "in an older input only", "in no input")
@@ -77,30 +77,32 @@ def locate_row(row: Row) -> Where:
     inputs, target = np.asarray(shown["inputs"], np.uint8), np.asarray(shown["target"], np.uint8)
     mask = np.asarray(shown["mask"], np.bool_)
     prediction, certainty = (np.asarray(mine[name], np.uint8) for name in ("prediction", "certainty"))
-    if not target.shape == prediction.shape == certainty.shape == mask.shape:
-        raise ValueError(f"shapes of windows {target.shape} and predictions {prediction.shape} differ")
+    spec = (result.grid or GridConfig()).spec
+    if not (len(target), spec.rows, spec.columns) == target.shape == prediction.shape == certainty.shape == mask.shape:
+        raise ValueError(f"shapes of windows {target.shape}, predictions {prediction.shape} or the grid differ")
+    bands = bands_of(spec)
     cells = np.zeros((len(BANDS), len(ORIGINS), CLASS_COUNT, CLASS_COUNT), np.int64)
     levels = np.zeros((LEVELS, 2), np.int64)
     for start in range(0, len(target), _CHUNK):
         part = slice(start, start + _CHUNK)
-        cells += count_cells(inputs[part], target[part], prediction[part], mask[part])
+        cells += count_cells(inputs[part], target[part], prediction[part], mask[part], bands)
         levels += certainty_counts(target[part], prediction[part], certainty[part], mask[part])
     return Where(row, cells, levels)
 
 
-def bands_of(height: int, width: int) -> NDArray[np.int64]:
-    """Number the band of each cell by its distance from the vehicle, at the middle of the bottom edge: -> (H, W)."""
-    cell_m = GRID_SIDE_M / height
-    ahead_m = (height - np.arange(height) - 0.5) * cell_m
-    left_m = (width / 2 - np.arange(width) - 0.5) * cell_m
-    return np.asarray(np.digitize(np.hypot(ahead_m[:, None], left_m[None]), BAND_EDGES_M), np.int64)
+def bands_of(spec: GridSpec) -> NDArray[np.int64]:
+    """Number the band of each cell by its distance from the vehicle: -> (H, W)."""
+    forward_m, left_m = spec.centres_m()
+    return np.asarray(np.digitize(np.hypot(forward_m[:, None], left_m), BAND_EDGES_M), np.int64)
 
 
-def count_cells(inputs: Grid, target: Grid, prediction: Grid, mask: NDArray[np.bool_]) -> Counts:
-    """Count cells outside M: inputs (N, S, T, H, W), grids (N, H, W) -> (bands, origins, C, C)."""
+def count_cells(
+    inputs: Grid, target: Grid, prediction: Grid, mask: NDArray[np.bool_], bands: NDArray[np.int64]
+) -> Counts:
+    """Count cells outside M: inputs (N, S, T, H, W), grids (N, H, W), bands (H, W) -> (bands, origins, C, C)."""
     seen = (inputs != UNKNOWN).any(axis=1)  # (N, T, H, W)
     origin = np.where(seen[:, -1], 0, np.where(seen.any(axis=1), 1, 2))
-    index = bands_of(target.shape[1], target.shape[2])[None] * len(ORIGINS) + origin
+    index = bands * len(ORIGINS) + origin
     index = (index * CLASS_COUNT + target) * CLASS_COUNT + prediction
     shape = (len(BANDS), len(ORIGINS), CLASS_COUNT, CLASS_COUNT)
     return np.asarray(np.bincount(index[~mask], minlength=int(np.prod(shape))).reshape(shape), np.int64)

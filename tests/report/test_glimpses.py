@@ -1,9 +1,9 @@
 import shlex
+from dataclasses import replace
 
 import pytest
 
-from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.report.glimpses import Glimpses, grid_config, times
+from semgrid_eval.report.glimpses import Glimpses, times
 from semgrid_eval.report.reading import load_runs
 from semgrid_eval.scores.results import read_run, write_run
 
@@ -40,14 +40,16 @@ def test_a_window_is_played_from_the_folders_of_the_runs_own_command(seen, tmp_p
 def test_pictures_of_a_log_are_found_by_its_path(seen):
     result = row_of(seen, "own-DC").shown
     window = result.record.windows[1]
-    kept = Glimpses(seen).of(window.log, result, GridConfig())
+    kept = Glimpses(seen).of(window.log, result)
     assert {window.target_stamp_ns, *window.input_stamps_ns} <= kept.frames.keys()
 
 
 def test_what_was_not_kept_is_none(seen):
     kept, result = Glimpses(seen), row_of(seen, "own-DC").shown
-    assert kept.of("val/another.mcap", result, GridConfig()) is None
-    assert kept.of("val/toy0.mcap", result, GridConfig(camera="rear")) is None
+    assert kept.of("val/another.mcap", result) is None
+    assert kept.of("val/toy0.mcap", result) is not None
+    rear = replace(result, record=result.record.model_copy(update={"config": {"grid": {"camera": "rear"}}}))
+    assert kept.of("val/toy0.mcap", rear) is None
 
 
 def test_a_log_to_train_on_may_have_the_same_path_as_one_to_score(seen, tmp_path):
@@ -55,18 +57,13 @@ def test_a_log_to_train_on_may_have_the_same_path_as_one_to_score(seen, tmp_path
     same_paths = tuple(log.model_copy(update={"digest": f"{i:016x}"}) for i, log in enumerate(record.logs))
     write_run(tmp_path, record.model_copy(update={"logs": same_paths + record.logs}))
     (tmp_path / "pictures").symlink_to(seen / "pictures")
-    assert Glimpses(tmp_path).of(result.record.windows[0].log, result, GridConfig()) is not None
-
-
-def test_the_grids_of_a_result_are_known_where_it_tells(seen, run):
-    assert grid_config(row_of(seen, "own-Sp2").shown) == GridConfig()
-    assert grid_config(row_of(run, "ED-DC").shown) is None
+    assert Glimpses(tmp_path).of(result.record.windows[0].log, result) is not None
 
 
 def test_times_can_be_pasted_into_viewers(seen):
     result = row_of(seen, "own-DC").shown
     window = result.record.windows[0]
-    kept = Glimpses(seen).of(window.log, result, GridConfig())
+    kept = Glimpses(seen).of(window.log, result)
     assert times(window.target_stamp_ns, kept) == (
         "1000000000470588232 ns",
         "1000000000.470588232 s",

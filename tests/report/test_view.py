@@ -21,7 +21,7 @@ SPLIT = ("split2_upper", "split2_lower")
 def view(seen):
     row = next(row for row in load_runs([seen])[0].rows if row.name == "own-Sp2")
     window = row.shown.record.windows[1]
-    return View(window, Glimpses(seen).of(window.log, GridConfig()), GridConfig(), SPLIT)
+    return View(window, Glimpses(seen).of(window.log, row.shown), GridConfig(), SPLIT)
 
 
 def decoded(uri):

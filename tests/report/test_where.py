@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from support.fake_run import make_fake_run
 
 from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
 from semgrid_eval.errors import ResultError
+from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.report.reading import load_runs
 from semgrid_eval.report.where import (
     BANDS,
@@ -21,16 +23,16 @@ from semgrid_eval.report.where import (
 )
 from semgrid_eval.scores.iou import confusion
 
-SHAPE = (2, 4, 4)
+SHAPE = (2, 8, 8)
+SPEC = GridSpec(rows=8, columns=8, cell_m=10.0, agent_row=6, agent_column=3)
 CLASSES = st.integers(0, CLASS_COUNT - 1)
 GRIDS = arrays(np.uint8, SHAPE, elements=CLASSES)
-INPUTS = arrays(np.uint8, (2, 2, 3, 4, 4), elements=CLASSES)
+INPUTS = arrays(np.uint8, (2, 2, 3, 8, 8), elements=CLASSES)
 MASKS = arrays(np.bool_, SHAPE)
 
 
-def _slow_band(row, column, height=4, width=4):
-    ahead_m, left_m = (height - row - 0.5) * 100 / height, (width / 2 - column - 0.5) * 100 / height
-    return sum(math.hypot(ahead_m, left_m) >= edge for edge in (20, 40, 60))
+def _slow_band(row, column):
+    return sum(math.hypot((6 - row - 0.5) * 10, (3 - column - 0.5) * 10) >= edge for edge in (20, 40, 60))
 
 
 def _slow_origin(past):
@@ -47,13 +49,13 @@ def test_cells_are_counted_like_by_hand(inputs, target, prediction, mask):
         if not mask[n, row, column]:
             place = _slow_band(row, column), _slow_origin(inputs[n, :, :, row, column].tolist())
             expected[(*place, target[n, row, column], prediction[n, row, column])] += 1
-    got = count_cells(inputs, target, prediction, mask)
+    got = count_cells(inputs, target, prediction, mask, bands_of(SPEC))
     np.testing.assert_array_equal(got, expected)
     np.testing.assert_array_equal(got.sum(axis=(0, 1)), confusion(target, prediction, mask).sum(axis=0))
 
 
 def test_bands_grow_with_the_distance_from_the_bottom_middle():
-    bands = bands_of(128, 128)
+    bands = bands_of(GridSpec())
     assert bands[127, 63] == bands[127, 64] == bands[104, 64] == 0
     assert bands[0, 64] == len(BANDS) - 1
     np.testing.assert_array_equal(bands, bands[:, ::-1])
@@ -69,6 +71,26 @@ def rows(run):
 def test_a_row_in_chunks_counts_all_its_cells(rows):
     where = locate_row(rows["ED-DC"])
     np.testing.assert_array_equal(where.cells.sum(axis=(0, 1)), rows["ED-DC"].shown.counts.sum(axis=0))
+
+
+def _of_grid(row, **spec):
+    """Let a row tell that its grids have another extent."""
+    grid = GridConfig(spec=GridSpec(**spec)).model_dump(mode="json")
+    record = row.results[0].record.model_copy(update={"config": {"grid": grid}})
+    return replace(row, results=(replace(row.results[0], record=record),))
+
+
+@pytest.mark.parametrize(("cell_m", "band"), [(0.1, 0), (0.25, 1)])
+def test_distances_are_in_the_metres_of_the_rows_own_grid(rows, cell_m, band):
+    where = locate_row(_of_grid(rows["BL-DC"], cell_m=cell_m))
+    assert where.cells[band].any()
+    assert not where.cells[band + 1 :].any()
+
+
+def test_a_row_whose_grids_have_another_shape_than_it_tells_is_named(rows):
+    found, (problem,) = locate_rows([_of_grid(rows["BL-DC"], rows=256, agent_row=256)])
+    assert found == []
+    assert problem.startswith("BL-DC: shapes of windows (16, 128, 128)")
 
 
 def test_a_baseline_of_the_newest_input_knows_nothing_else(rows):
