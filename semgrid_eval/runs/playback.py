@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -114,16 +115,14 @@ class _Scored:
     grid: GridConfig
     arrays: dict[str, NDArray[np.uint8]]
 
-    @property
-    def recordings(self) -> list[str]:
-        """Names in the order of their first windows."""
-        return list(dict.fromkeys(window.recording for window in self.record.windows))
-
-    def windows_of(self, name: str) -> list[int]:
-        """Indices of a recording's windows in the order of time."""
+    @cached_property
+    def windows_of(self) -> dict[str, list[int]]:
+        """Indices of each recording's windows in the order of time; recordings in the order of their first windows."""
         windows = self.record.windows
-        found = [i for i, window in enumerate(windows) if window.recording == name]
-        return sorted(found, key=lambda i: windows[i].target_stamp_ns)
+        found: dict[str, list[int]] = {window.recording: [] for window in windows}
+        for i in sorted(range(len(windows)), key=lambda i: windows[i].target_stamp_ns):
+            found[windows[i].recording].append(i)
+        return found
 
     @property
     def place(self) -> GridPlace:
@@ -164,7 +163,7 @@ def _check_shapes(
 
 
 def _choose(scored: _Scored, recording: str | None, *, every_recording: bool) -> list[str]:
-    names = scored.recordings
+    names = list(scored.windows_of)
     if not names:
         raise InputError("has no scored window", field=f"row {scored.row.name}")
     if every_recording:
@@ -186,7 +185,7 @@ def _listed(names: Sequence[str]) -> str:
 def _open_drive(record: RunRecord, scored: _Scored, name: str, logs: Path, stack: ExitStack) -> Drive:
     if not logs.is_dir():
         raise InputError("is no folder", path=logs)
-    path = scored.record.windows[scored.windows_of(name)[0]].log
+    path = scored.record.windows[scored.windows_of[name][0]].log
     log = stack.enter_context(LogReader(logs / path))
     known = scored_digest(record, scored.record, path)
     if known not in (None, log.digest):
@@ -204,7 +203,7 @@ class _Track:
 
     def __init__(self, scored: _Scored, name: str, drive: Drive | None) -> None:
         self._scored, self._drive = scored, drive
-        self._indices = scored.windows_of(name)
+        self._indices = scored.windows_of[name]
         windows = [scored.record.windows[i] for i in self._indices]
         self._windows = windows
         self._inputs_ns = [self._input_stamps_ns(window) for window in windows]

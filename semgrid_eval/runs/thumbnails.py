@@ -146,9 +146,9 @@ def _requests(run: Path, windows: Iterable[tuple["WindowSet", str | None]]) -> l
     for chosen, camera in windows:
         data = chosen.data
         frames = np.unique(np.append(chosen.inputs.cpu().numpy(), chosen.target_frames.cpu().numpy()))
-        owners = np.searchsorted(data.first_frames, frames, side="right") - 1
-        for owner in np.unique(owners).tolist():
-            stamps_ns = frozenset(data.stamps_ns[frames[owners == owner]].tolist())
+        owners, begins = np.unique(data.locate(frames)[0], return_index=True)
+        for owner, own in zip(owners.tolist(), np.split(frames, begins[1:]), strict=True):
+            stamps_ns = frozenset(data.stamps_ns[own].tolist())
             file = pictures_file(run.resolve(), data.digests[owner], camera)
             known = logs[file].stamps_ns if file in logs else frozenset()
             logs[file] = Request(Path(data.logs[owner]).resolve(), data.digests[owner], camera, known | stamps_ns, file)

@@ -4,7 +4,6 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import torch
 
 from semgrid_eval.arrays import write_arrays
@@ -252,16 +251,15 @@ def _predictor(row: Row, trained: Trained | None, counted: WindowSet | None) -> 
 def _window_records(windows: WindowSet, log_of: dict[str, str]) -> tuple[results.WindowRecord, ...]:
     data = windows.data
     frames, inputs = windows.target_frames.cpu().numpy(), windows.inputs.cpu().numpy()
-    owners = np.searchsorted(data.first_frames, frames, side="right") - 1
     return tuple(
         results.WindowRecord(
             recording=data.recordings[owner],
             log=log_of[data.recordings[owner]],
-            target_frame=int(frame - data.first_frames[owner]),
+            target_frame=int(target),
             target_stamp_ns=int(data.stamps_ns[frame]),
             input_stamps_ns=tuple(data.stamps_ns[past].tolist()),
         )
-        for frame, past, owner in zip(frames, inputs, owners, strict=True)
+        for frame, past, owner, target in zip(frames, inputs, *data.locate(frames), strict=True)
     )
 
 

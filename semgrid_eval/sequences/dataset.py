@@ -57,6 +57,11 @@ class GridData:
         """Frames of each recording."""
         return [int(count) for count in np.diff(self.first_frames)]
 
+    def locate(self, frames: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Find frames, indices along F: (N,) -> the recording of each (N,) and the index of the frame there (N,)."""
+        owners = np.searchsorted(self.first_frames, frames, side="right") - 1
+        return owners, frames - self.first_frames[owners]
+
     def sensor_index(self, name: str) -> int:
         """Find a sensor.
 
@@ -123,11 +128,10 @@ class WindowSet:
 
     def batch(self, chosen: Tensor | slice) -> WindowBatch:
         """Gather the chosen windows: (B,) int64 or a slice."""
-        grids = self.data.grids
         shift_cells = self.shift_cells[chosen]
-        seen = grids[self.sensor_rows[None, :, None], self.inputs[chosen][:, None, :]]
+        seen = self.data.grids[self.sensor_rows[None, :, None], self.inputs[chosen][:, None, :]]
         aligned = shift_grids(seen, shift_cells[:, None])
-        target = grids[self.data.sensor_index(TARGET_SENSOR), self.target_frames[chosen]]
+        target = self.data.grids[self.data.sensor_index(TARGET_SENSOR), self.target_frames[chosen]]
         return WindowBatch(
             past=aligned if self.translate else seen,
             sensors=self.sensors,
@@ -152,11 +156,9 @@ class WindowSet:
 
     def _flags_of(self, frames: NDArray[np.int64]) -> NDArray[np.uint8]:
         result = np.zeros((len(frames), *self.data.grids.shape[-2:]), np.uint8)
-        owners = np.searchsorted(self.data.first_frames, frames, side="right") - 1
-        for flags, frame, owner in zip(result, frames, owners, strict=True):
-            known = self.data.actors[owner]
-            if known is not None:
-                flags[:] = known[frame - self.data.first_frames[owner]]
+        for flags, owner, frame in zip(result, *self.data.locate(frames), strict=True):
+            if (known := self.data.actors[owner]) is not None:
+                flags[:] = known[frame]
         return result
 
     def batches(self, size: int) -> Iterator[WindowBatch]:
@@ -217,8 +219,7 @@ def select_windows(
         raise InputError("there are no windows")
     recording = np.array([window.recording for window in windows])
     frames = np.array([(*window.input_frames, window.target_frame) for window in windows])
-    first = data.first_frames[recording]
-    frames = first[:, None] + frames
+    frames += data.first_frames[recording][:, None]
     _check_frames(data, windows, frames, recording)
     inputs, target = frames[:, :-1], frames[:, -1]
     moved_m = data.position_m[target][:, None] - data.position_m[inputs]
@@ -295,6 +296,5 @@ def _check_frames(
     outside = (frames.min(axis=1) < first) | (frames.max(axis=1) > last)
     if outside.any():
         window = windows[int(outside.argmax())]
-        count = data.frame_counts[window.recording]
-        name = data.recordings[window.recording]
+        name, count = data.recordings[window.recording], data.frame_counts[window.recording]
         raise InputError(f"{name} has {count} frames, and a window needs frame {window.target_frame}")

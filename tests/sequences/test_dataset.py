@@ -85,6 +85,14 @@ def test_pole_seen_by_a_moving_vehicle_stays_where_it_is():
     assert torch.equal(batch.past[0, 0, 1], batch.target[0])
 
 
+def test_frames_are_found_in_their_recordings():
+    lengths = [3, 1, 4]
+    data = stack_recordings([random_recording(i, frames=count) for i, count in enumerate(lengths)], cell_m=0.5)
+    expected = [(owner, frame) for owner, count in enumerate(lengths) for frame in range(count)]
+    owners, frames = data.locate(np.arange(8))
+    assert list(zip(owners.tolist(), frames.tolist(), strict=True)) == expected
+
+
 @pytest.mark.parametrize("translate", [True, False])
 def test_batch_holds_the_frames_of_its_windows(translate):
     recordings = [random_recording(seed, frames=14 + seed, sensors=SENSORS) for seed in range(3)]
