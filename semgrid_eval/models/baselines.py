@@ -17,6 +17,11 @@ def overlay(grids: Tensor) -> Tensor:
     return result
 
 
+def newest_first(batch: WindowBatch) -> Tensor:
+    """Put the grids of the past in one row, newest first and sensors in order: (B, T * S, H, W)."""
+    return batch.past.flip(2).transpose(1, 2).flatten(1, 2)
+
+
 class RepeatNewest:
     """BL-DC where the row translates, BL-NT where it does not: the newest grid of the first sensor, as it is given."""
 
@@ -37,33 +42,19 @@ class OverlaySensors:
         Raises:
             InputError: the row has no sensor of that name.
         """
-        newest = batch.past[:, _top_first(batch.sensors, self._top), -1]
-        return one_hot(overlay(newest))
+        if self._top not in batch.sensors:
+            raise InputError(f"no sensor {self._top!r} among {', '.join(batch.sensors)}", field="overlay")
+        top = batch.sensors.index(self._top)
+        order = [top, *(row for row in range(len(batch.sensors)) if row != top)]
+        return one_hot(overlay(batch.past[:, order, -1]))
 
 
 class FuseAll:
     """BL-Fuse: all inputs of all sensors overlaid, in each cell the newest known class (not in the paper).
 
-    Args:
-        top: the sensor that wins among grids of the same time; None takes the row's order.
+    Of grids of the same time the row's first sensor wins.
     """
 
-    def __init__(self, top: str | None = None) -> None:
-        self._top = top
-
     def __call__(self, batch: WindowBatch, /) -> Tensor:
-        """Give the overlay as certain scores: (B, C, H, W).
-
-        Raises:
-            InputError: the row has no sensor of that name.
-        """
-        order = _top_first(batch.sensors, self._top or batch.sensors[0])
-        newest_first = batch.past[:, order].flip(2).transpose(1, 2)  # (B, T, S, H, W)
-        return one_hot(overlay(newest_first.flatten(1, 2)))
-
-
-def _top_first(sensors: tuple[str, ...], top: str) -> list[int]:
-    if top not in sensors:
-        raise InputError(f"no sensor {top!r} among {', '.join(sensors)}", field="overlay")
-    first = sensors.index(top)
-    return [first, *(row for row in range(len(sensors)) if row != first)]
+        """Give the overlay as certain scores: (B, C, H, W)."""
+        return one_hot(overlay(newest_first(batch)))

@@ -4,7 +4,7 @@ import torch
 from torch import Tensor
 
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.progress import Progress, silent
+from semgrid_eval.models.baselines import newest_first
 from semgrid_eval.sequences.dataset import WindowBatch, WindowSet
 
 GRID_LIMIT = 5
@@ -30,25 +30,21 @@ class ClassTable:
         return table[_rows(batch, self._grids)].permute(0, 3, 1, 2)
 
 
-def count_table(windows: WindowSet, *, batch: int = 64, progress: Progress = silent) -> ClassTable:
+def count_table(windows: WindowSet, *, batch: int = 64) -> ClassTable:
     """Count the target's classes over all cells outside M of training windows."""
     grids = min(windows.grids_per_window, GRID_LIMIT)
     size = CLASS_COUNT ** (grids + 1)
     counts = torch.zeros(size, dtype=torch.int64)
-    done = 0
     for part in windows.batches(batch):
         index = _rows(part, grids) * CLASS_COUNT + part.target
         counts += torch.bincount(index[~part.mask], minlength=size).cpu()
-        done += len(part.target)
-        progress(done, len(windows))
     return ClassTable(_smoothed(counts.view([CLASS_COUNT] * (grids + 1)).double()).float(), grids)
 
 
 def _rows(batch: WindowBatch, grids: int) -> Tensor:
     """Number the classes of the newest grids, newest first and sensors in order: (B, H, W) int64."""
-    newest_first = batch.past.flip(2).transpose(1, 2).flatten(1, 2)[:, :grids]  # (B, K, H, W)
     rows = torch.zeros_like(batch.target, dtype=torch.int64)
-    for grid in newest_first.unbind(dim=1):
+    for grid in newest_first(batch)[:, :grids].unbind(dim=1):
         rows = rows * CLASS_COUNT + grid
     return rows
 

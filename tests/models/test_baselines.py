@@ -62,9 +62,9 @@ def test_sensor_on_top_hides_the_other_where_it_knows_something():
 def test_fusing_lets_time_win_over_sensors():
     older, newer = [[1, 1, 1, 0, 1]], [[2, 0, 0, 0, 0]]
     older_top, newer_top = [[3, 3, 0, 0, 3]], [[4, 4, 0, 0, 0]]
-    batch = batch_of([[older, newer], [older_top, newer_top]], (LOWER, UPPER))
-    assert predicted(FuseAll(), batch) == [[2, 4, 1, 0, 1]]
-    assert predicted(FuseAll(UPPER), batch) == [[4, 4, 1, 0, 3]]
+    lower, upper = [older, newer], [older_top, newer_top]
+    assert predicted(FuseAll(), batch_of([lower, upper], (LOWER, UPPER))) == [[2, 4, 1, 0, 1]]
+    assert predicted(FuseAll(), batch_of([upper, lower], (UPPER, LOWER))) == [[4, 4, 1, 0, 3]]
 
 
 def test_unknown_top_sensor_is_named():
