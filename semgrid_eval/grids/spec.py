@@ -36,8 +36,8 @@ class GridSpec(Config):
 
     def centres_m(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return where the cells' centres are from the vehicle: the rows (H,) forward, the columns (W,) left."""
-        forward_m = (self.agent_row - np.arange(self.rows) - 0.5) * self.cell_m
-        left_m = (self.agent_column - np.arange(self.columns) - 0.5) * self.cell_m
+        forward_m = (self.agent_row - np.arange(self.rows, dtype=np.float64) - 0.5) * self.cell_m
+        left_m = (self.agent_column - np.arange(self.columns, dtype=np.float64) - 0.5) * self.cell_m
         return forward_m, left_m
 
 

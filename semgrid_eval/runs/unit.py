@@ -1,6 +1,7 @@
 """One unit of a run: one row with one seed, trained if need be, scored, and kept under the digest of all of it."""
 
 import shutil
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,7 +25,9 @@ from semgrid_eval.runs.sources import Sources, grid_digest
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
 from semgrid_eval.sequences.dataset import WindowSet, select_windows, window_arrays
-from semgrid_eval.sequences.windows import training_windows, validation_windows
+from semgrid_eval.sequences.windows import WindowConfig, WindowPlan, training_windows, validation_windows
+
+WindowPlanner = Callable[[Sequence[int], WindowConfig], WindowPlan]
 
 
 class Worker:
@@ -54,6 +57,8 @@ class Worker:
         self._out, self.device, self._stage, self._example_seed = out, device, stage, example_seed
         self._sources, self._scored_sources = sources, scored_sources or sources
         self._trainings = trainings or out / "trainings"
+        self._selected: dict[object, tuple[WindowSet, dict[int, str]]] = {}
+        self._kept: set[str] = set()  # ids of the windows that are known to lie in the run's folder
 
     @property
     def sources(self) -> tuple[Sources, ...]:
@@ -81,10 +86,9 @@ class Worker:
         Raises:
             SemgridError: there is no such window.
         """
-        data = self._scored_sources.data(row.grid, row.validation_split)
-        plan = validation_windows(data.frame_counts, row.scored_window)
-        left_out = {self._scored_sources.log_of[data.recordings[index]]: why for index, why in plan.too_short.items()}
-        return select_windows(data, plan.windows, sensors=row.sensors, translate=row.translate), left_out
+        sources = self._scored_sources
+        scored, too_short = self._select(sources, row, row.validation_split, row.scored_window, validation_windows)
+        return scored, {sources.log_of[scored.data.recordings[index]]: why for index, why in too_short.items()}
 
     def run(self, row: Row, seed: int | None) -> "Job":
         """Make sure that the result of a row with one seed lies in the run's folder, and return what was resolved.
@@ -127,10 +131,20 @@ class Worker:
     def _shows(self, seed: int | None) -> bool:
         return seed in (None, self._example_seed)
 
+    def _select(
+        self, sources: Sources, row: Row, split: str, config: WindowConfig, plan: WindowPlanner
+    ) -> tuple[WindowSet, dict[int, str]]:
+        """Select windows once for all seeds and rows that share them, with the reasons why recordings are too short."""
+        key = (sources, grid_digest(row.grid), split, config, row.sensors, row.translate, plan)
+        if key not in self._selected:
+            data = sources.data(row.grid, split)
+            planned = plan(data.frame_counts, config)
+            windows = select_windows(data, planned.windows, sensors=row.sensors, translate=row.translate)
+            self._selected[key] = windows, planned.too_short
+        return self._selected[key]
+
     def _training_windows(self, row: Row) -> WindowSet:
-        data = self._sources.data(row.grid, row.train_split)
-        windows = training_windows(data.frame_counts, row.window).windows
-        return select_windows(data, windows, sensors=row.sensors, translate=row.translate)
+        return self._select(self._sources, row, row.train_split, row.window, training_windows)[0]
 
     def _watched(self, row: Row, scored: WindowSet) -> WindowSet | None:
         """Select the windows whose loss a training notes; they are the training logs' own, wherever it is scored.
@@ -140,11 +154,9 @@ class Worker:
         if self._scored_sources is self._sources:
             return scored
         try:
-            data = self._sources.data(row.grid, row.validation_split)
-            windows = validation_windows(data.frame_counts, row.window).windows
+            return self._select(self._sources, row, row.validation_split, row.window, validation_windows)[0]
         except InputError:  # no such logs among them, and none is needed
             return None
-        return select_windows(data, windows, sensors=row.sensors, translate=row.translate)
 
     def _training(self, row: Row, seed: int, watched: WindowSet | None) -> "Training":
         windows = self._training_windows(row)
@@ -176,10 +188,13 @@ class Worker:
             )
 
     def _keep_windows(self, windows: WindowSet, windows_id: str) -> None:
+        if windows_id in self._kept:
+            return
         try:
             results.read_windows(self._out, windows_id)
         except ResultError:  # not there yet, or damaged
             write_arrays(results.windows_file(self._out, windows_id), window_arrays(windows))
+        self._kept.add(windows_id)
 
 
 @dataclass(frozen=True)
