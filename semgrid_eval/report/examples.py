@@ -3,7 +3,7 @@
 The rule is the supplement's: min(IoU_ED-DC - IoU_BL-DC, IoU_ED-DC - IoU_BL-NT), for one class or over all of them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
 from semgrid_eval.report.changes import flat
 from semgrid_eval.report.comparison import Headline, reference_of
-from semgrid_eval.report.reading import Result, Row
+from semgrid_eval.report.reading import Result, Row, key_of
 from semgrid_eval.scores.iou import class_iou
 from semgrid_eval.scores.results import WindowRecord
 
@@ -110,7 +110,7 @@ def by_window(picks: Sequence[Pick]) -> list[tuple[Pick, ...]]:
 
 def mean_iou(result: Result, window: WindowRecord) -> float:
     """Mean IoU of a result in one window over the known classes with enough cells; NaN where it has no such window."""
-    at = positions(result).get(key_of(window))
+    at = result.places.get(key_of(window))
     if at is None:
         return float("nan")
     counts = result.counts[[at]].astype(np.int64)
@@ -131,21 +131,10 @@ def rule_values(contest: Contest) -> Array:
     return np.where(few, np.nan, value)
 
 
-def key_of(window: WindowRecord) -> tuple[str, int]:
-    """Identify the target frame of a window across rows."""
-    return window.recording, window.target_stamp_ns
-
-
-def positions(result: Result) -> Mapping[tuple[str, int], int]:
-    """Index a result's windows by their target frame."""
-    return {key_of(window): i for i, window in enumerate(result.record.windows)}
-
-
 def _aligned_iou(result: Result, other: Result) -> Array:
     """IoU of another result's windows in the order of `result`; NaN where it has no such window."""
     theirs = class_iou(other.counts.astype(np.int64))
-    at = positions(other)
-    places = np.array([at.get(key_of(window), -1) for window in result.record.windows], np.intp)
+    places = np.array([other.places.get(key_of(window), -1) for window in result.record.windows], np.intp)
     padded = np.vstack([theirs, np.full((1, CLASS_COUNT), np.nan)])
     return np.asarray(padded[places])
 

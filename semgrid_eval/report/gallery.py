@@ -1,15 +1,16 @@
 """The example windows of a page: who is measured against whom, which windows show it, and what cannot be shown."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from semgrid_eval.errors import SemgridError
-from semgrid_eval.grids.spec import TARGET_SENSOR
 from semgrid_eval.report.comparison import Headline
 from semgrid_eval.report.examples import Contest, Pick, choose, choose_by_class, contests
 from semgrid_eval.report.glimpses import Glimpses
-from semgrid_eval.report.panels import Example, draw_examples
-from semgrid_eval.report.reading import Row
+from semgrid_eval.report.panels import Example, Shown, draw_examples
+from semgrid_eval.report.reading import Row, WindowReader
+from semgrid_eval.scores.results import read_windows
 
 _BEST, _WORST, _OTHER = 3, 3, 1
 _AHEAD = "Looking further ahead"
@@ -32,7 +33,7 @@ class Group:
     seed: int | None
     windows: tuple[Example, ...]
     problem: str
-    shown: bool
+    shown: bool = False
 
 
 def example_groups(rows: Sequence[Row], found: Headline | None) -> list[Group]:
@@ -43,28 +44,40 @@ def example_groups(rows: Sequence[Row], found: Headline | None) -> list[Group]:
     kept = {run: Glimpses(run) for run in dict.fromkeys(contest.model.run for contest in chosen)}
     main, *others = chosen
     plans = [
-        (main, choose(main, best=_BEST, worst=_WORST), ""),
-        (main, choose_by_class(main), ", class by class"),
-        *((each, choose(each, best=_OTHER, worst=_OTHER), "") for each in others),
+        {"": choose(main, best=_BEST, worst=_WORST), ", class by class": choose_by_class(main)},
+        *({"": choose(each, best=_OTHER, worst=_OTHER)} for each in others),
     ]
-    return [
-        example_group(contest, picks, kept[contest.model.run], note=note, shown=not i)
-        for i, (contest, picks, note) in enumerate(plans)
-    ]
+    read = lru_cache(1)(read_windows)  # contests that share windows are drawn one after the other
+    drawn = {
+        i: groups_of(chosen[i], plans[i], kept[chosen[i].model.run], read)
+        for i in sorted(range(len(chosen)), key=lambda i: chosen[i].model.window_set)
+    }
+    first, *rest = (group for i in range(len(chosen)) for group in drawn[i])
+    return [replace(first, shown=True), *rest]
 
 
-def example_group(
-    contest: Contest, picks: Sequence[Pick], glimpses: Glimpses, *, note: str = "", shown: bool = False
-) -> Group:
-    """Draw the chosen windows of a contest; arrays that cannot be read become the group's problem."""
-    windows: tuple[Example, ...] = ()
-    problem = "" if picks else "No window has enough cells of any class."
+def groups_of(
+    contest: Contest, plan: Mapping[str, Sequence[Pick]], glimpses: Glimpses, read: WindowReader = read_windows
+) -> list[Group]:
+    """Draw the chosen windows of a contest, a group for each end of its title; what cannot be read is their problem."""
+    windows: dict[str, tuple[Example, ...]] = dict.fromkeys(plan, ())
+    problem = ""
     try:
-        windows = tuple(draw_examples(contest, picks, glimpses)) if picks else ()
+        shown = Shown(contest, {pick.index for picks in plan.values() for pick in picks}, read)
+        windows = {end: tuple(draw_examples(shown, picks, glimpses)) for end, picks in plan.items()}
     except (SemgridError, ValueError, IndexError) as error:
         problem = f"The pictures of {contest.model.name} cannot be shown: {error}"
-    seed = contest.result.record.seed
-    return Group(_title(contest) + note, _hint(contest, windows), contest.rule, seed, windows, problem, shown)
+    return [
+        Group(
+            title=_title(contest) + end,
+            hint=_hint(contest, windows[end]),
+            rule=contest.rule,
+            seed=contest.result.record.seed,
+            windows=windows[end],
+            problem=problem if picks else "No window has enough cells of any class.",
+        )
+        for end, picks in plan.items()
+    ]
 
 
 def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
@@ -105,6 +118,6 @@ def _hint(contest: Contest, windows: Sequence[Example]) -> str:
             "of an input does. It is taken as flat, so walls and vehicles may reach into it. What a model says there "
             "it has learned."
         )
-    if any(name != TARGET_SENSOR for name in contest.model.record.sensors) and len(contest.model.record.sensors) > 1:
+    if len(contest.model.record.sensors) > 1:
         return "Each input is seen by several sensors; the target comes from the whole image."
     return ""

@@ -1,9 +1,10 @@
 """Reads a run's result files; what cannot be read becomes a failure of its row, and the rest goes on."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,12 +20,16 @@ from semgrid_eval.scores.results import (
     ResultRecord,
     RowRecord,
     RunRecord,
+    WindowRecord,
     read_counts,
     read_history,
     read_result,
     read_run,
     result_folder,
 )
+
+WindowReader = Callable[[Path, str], Mapping[str, NDArray[Any]]]
+"""Reads a set of windows, as `scores.results.read_windows` does, from a run by its id."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,11 @@ class Result:
         except (KeyError, ConfigError):
             return None
 
+    @cached_property
+    def places(self) -> Mapping[tuple[str, int], int]:
+        """The index of each window by `key_of`."""
+        return {key_of(window): i for i, window in enumerate(self.record.windows)}
+
 
 @dataclass(frozen=True)
 class Row:
@@ -69,6 +79,11 @@ class Row:
         """The result to show pictures of: the first one that kept its predictions."""
         kept = (result for result in self.results if (result.folder / PREDICTIONS_FILE).is_file())
         return next(kept, self.results[0])
+
+    @property
+    def window_set(self) -> tuple[Path, str]:
+        """The run and id of the shown result's set of windows, which rows may share."""
+        return self.run, self.shown.record.windows_id
 
     @property
     def windows(self) -> int:
@@ -102,6 +117,11 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
             progress(done, total, row.name)
         runs.append(Run(folder, tag, record, tuple(rows)))
     return tuple(runs)
+
+
+def key_of(window: WindowRecord) -> tuple[str, int]:
+    """Identify the target frame of a window across rows."""
+    return window.recording, window.target_stamp_ns
 
 
 def _tags(folders: Sequence[Path]) -> list[str]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from semgrid_eval.report.cells import interval, interval_phrase, number, plural, signed
 from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, HEADLINE, Headline, verdict
 from semgrid_eval.report.estimates import Estimate, RowScores
-from semgrid_eval.report.reading import Row, Run
+from semgrid_eval.report.reading import Row, Run, key_of
 from semgrid_eval.report.tables import LABELS
 
 Scores = Mapping[str, RowScores]
@@ -77,7 +77,7 @@ def _against_reference(scores: Scores, found: Headline | None) -> str:
 def _evidence(runs: Sequence[Run], scores: Scores) -> str:
     rows = [entry.row for entry in scores.values()]
     records = [window for row in rows for result in row.results for window in result.record.windows]
-    windows = len({(window.recording, window.target_stamp_ns) for window in records})
+    windows = len(set(map(key_of, records)))
     recordings = len({window.recording for window in records})
     text = f"This rests on {plural(windows, 'window')} from {plural(recordings, 'recording')}"
     seeds = [len(row.results) for row in rows if row.results[0].record.seed is not None]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.grids.spec import GridConfig, GridSpec
-from semgrid_eval.report.reading import Row
+from semgrid_eval.report.reading import Row, WindowReader
 from semgrid_eval.scores.calibration import LEVELS, certainty_counts, expected_calibration_error, reliability
 from semgrid_eval.scores.iou import category_iou, class_iou
 from semgrid_eval.scores.results import read_predictions, read_windows
@@ -55,16 +56,20 @@ class Where:
 
 def locate_rows(rows: Iterable[Row]) -> tuple[list[Where], list[str]]:
     """Count where each row is right, and say of which rows the arrays cannot be read."""
-    found, problems = [], []
-    for row in rows:
+    rows = list(rows)
+    read = lru_cache(1)(read_windows)  # rows that share windows come one after the other
+    found: dict[str, Where] = {}
+    problems: dict[str, str] = {}
+    for row in sorted(rows, key=lambda row: row.window_set):
         try:
-            found.append(locate_row(row))
+            found[row.name] = locate_row(row, read)
         except (SemgridError, ValueError, IndexError) as error:
-            problems.append(f"{row.name}: {error}")
-    return found, problems
+            problems[row.name] = f"{row.name}: {error}"
+    names = [row.name for row in rows]
+    return [found[name] for name in names if name in found], [problems[name] for name in names if name in problems]
 
 
-def locate_row(row: Row) -> Where:
+def locate_row(row: Row, read: WindowReader = read_windows) -> Where:
     """Count where a row is right.
 
     Raises:
@@ -72,7 +77,7 @@ def locate_row(row: Row) -> Where:
         ValueError: their shapes differ.
     """
     result = row.shown
-    shown = read_windows(row.run, result.record.windows_id)
+    shown = read(*row.window_set)
     mine = read_predictions(result.folder)
     inputs, target = np.asarray(shown["inputs"], np.uint8), np.asarray(shown["target"], np.uint8)
     mask = np.asarray(shown["mask"], np.bool_)

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from support.fake_run import FakeRow, make_fake_run
 
+from semgrid_eval.report import gallery as gallery_module
 from semgrid_eval.report.comparison import headline
 from semgrid_eval.report.estimates import score_rows
 from semgrid_eval.report.examples import Contest, choose
-from semgrid_eval.report.gallery import example_group, example_groups, gaps
+from semgrid_eval.report.gallery import example_groups, gaps, groups_of
 from semgrid_eval.report.glimpses import Glimpses
 from semgrid_eval.report.reading import load_runs
+from semgrid_eval.scores.results import read_windows
 
 
 def gallery(run):
@@ -32,6 +34,14 @@ def test_contests_horizons_and_sensors_are_shown_and_explained(seen):
     assert groups[2].hint.startswith("Each column asks the same model")
     assert "Hatched is the ground" in groups[4].hint
     assert gaps(rows, groups) == []
+
+
+def test_windows_are_read_once_for_contests_that_share_them(run, monkeypatch):
+    read = []
+    monkeypatch.setattr(gallery_module, "read_windows", lambda *args: read.append(args) or read_windows(*args))
+    _, groups = gallery(run)
+    assert [group.title for group in groups][2:] == ["ED-Sp2 against BL-Sp2"]
+    assert len(read) == len(set(read)) == 2
 
 
 def test_a_window_of_several_classes_is_shown_once(seen):
@@ -86,6 +96,6 @@ def test_lost_arrays_are_told_not_raised(tmp_path, lost):
         shutil.rmtree(run / "windows")
     for result in rows["ED-DC"].results if lost == "predictions.npz" else ():
         (result.folder / lost).unlink()
-    group = example_group(contest, choose(contest, best=1, worst=1), Glimpses(run))
+    (group,) = groups_of(contest, {"": choose(contest, best=1, worst=1)}, Glimpses(run))
     assert group.windows == ()
     assert (lost if lost == "predictions.npz" else contest.result.record.windows_id) in group.problem

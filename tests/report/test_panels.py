@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from semgrid_eval.report.examples import Contest, Pick, contests
 from semgrid_eval.report.glimpses import Glimpses
-from semgrid_eval.report.panels import draw_examples
+from semgrid_eval.report.panels import Shown, draw_examples
 from semgrid_eval.report.pictures import HATCH_LEGEND, MASK_LEGEND
 from semgrid_eval.report.reading import load_runs
 
@@ -17,7 +19,7 @@ def rows_of(run):
 def draw(run, model, *rivals, picks=(PICK,), baselines=()):
     rows = rows_of(run)
     contest = Contest(rows[model], tuple(rows[name] for name in rivals), tuple(rows.get(name) for name in baselines))
-    return list(draw_examples(contest, picks, Glimpses(run)))
+    return list(draw_examples(Shown(contest, {pick.index for pick in picks}), picks, Glimpses(run)))
 
 
 def kinds(column):
@@ -113,14 +115,7 @@ def test_a_rival_without_the_window_is_left_out(seen):
     rows = rows_of(seen)
     rival = rows["BL-DC"]
     record = rival.shown.record.model_copy(update={"windows": rival.shown.record.windows[1:]})
-    shorter = type(rival)(
-        **{
-            **vars(rival),
-            "results": (
-                type(rival.shown)(**{**vars(rival.shown), "record": record, "counts": rival.shown.counts[1:]}),
-            ),
-        }
-    )
-    (example,) = draw_examples(Contest(rows["own-DC"], (shorter,)), (PICK,), Glimpses(seen))
+    shorter = replace(rival, results=(replace(rival.shown, record=record, counts=rival.shown.counts[1:]),))
+    (example,) = draw_examples(Shown(Contest(rows["own-DC"], (shorter,)), {PICK.index}), (PICK,), Glimpses(seen))
     assert [column.title for column in example.answers] == ["own-DC", "Certainty"]
     assert np.all([column.pictures for column in example.answers])

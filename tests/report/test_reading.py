@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.report.reading import load_runs
+from semgrid_eval.report.reading import key_of, load_runs
 
 
 @pytest.fixture(scope="module")
@@ -20,3 +20,7 @@ def test_the_grids_of_a_result_are_known_where_it_tells(result):
     assert with_config(result, grid=grid.model_dump(mode="json")).grid == grid
     assert with_config(result, grid={"cells": 3}).grid is None
     assert result.grid is None
+
+
+def test_windows_are_found_by_their_target_frames(result):
+    assert [result.places[key_of(window)] for window in result.record.windows] == list(range(16))

@@ -11,6 +11,7 @@ from support.fake_run import make_fake_run
 from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
 from semgrid_eval.errors import ResultError
 from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.report import where
 from semgrid_eval.report.reading import load_runs
 from semgrid_eval.report.where import (
     BANDS,
@@ -22,6 +23,7 @@ from semgrid_eval.report.where import (
     locate_rows,
 )
 from semgrid_eval.scores.iou import confusion
+from semgrid_eval.scores.results import read_windows
 
 SHAPE = (2, 8, 8)
 SPEC = GridSpec(rows=8, columns=8, cell_m=10.0, agent_row=6, agent_column=3)
@@ -69,8 +71,8 @@ def rows(run):
 
 
 def test_a_row_in_chunks_counts_all_its_cells(rows):
-    where = locate_row(rows["ED-DC"])
-    np.testing.assert_array_equal(where.cells.sum(axis=(0, 1)), rows["ED-DC"].shown.counts.sum(axis=0))
+    found = locate_row(rows["ED-DC"])
+    np.testing.assert_array_equal(found.cells.sum(axis=(0, 1)), rows["ED-DC"].shown.counts.sum(axis=0))
 
 
 def _of_grid(row, **spec):
@@ -82,15 +84,25 @@ def _of_grid(row, **spec):
 
 @pytest.mark.parametrize(("cell_m", "band"), [(0.1, 0), (0.25, 1)])
 def test_distances_are_in_the_metres_of_the_rows_own_grid(rows, cell_m, band):
-    where = locate_row(_of_grid(rows["BL-DC"], cell_m=cell_m))
-    assert where.cells[band].any()
-    assert not where.cells[band + 1 :].any()
+    found = locate_row(_of_grid(rows["BL-DC"], cell_m=cell_m))
+    assert found.cells[band].any()
+    assert not found.cells[band + 1 :].any()
 
 
 def test_a_row_whose_grids_have_another_shape_than_it_tells_is_named(rows):
     found, (problem,) = locate_rows([_of_grid(rows["BL-DC"], rows=256, agent_row=256)])
     assert found == []
     assert problem.startswith("BL-DC: shapes of windows (16, 128, 128)")
+
+
+def test_windows_that_rows_share_are_read_once(rows, monkeypatch):
+    read = []
+    monkeypatch.setattr(where, "read_windows", lambda *args: read.append(args) or read_windows(*args))
+    mixed = [rows[name] for name in ("ED-Sp2", "BL-DC", "BL-Sp2", "ED-DC")]
+    found, problems = locate_rows(mixed)
+    assert [each.row.name for each in found] == ["ED-Sp2", "BL-DC", "BL-Sp2", "ED-DC"]
+    assert problems == []
+    assert len(read) == len({row.window_set for row in mixed}) == 2
 
 
 def test_a_baseline_of_the_newest_input_knows_nothing_else(rows):
@@ -104,12 +116,12 @@ def test_calibration_joins_levels_into_bins(rows):
     levels[255] = [1, 3]
     levels[51] = [4, 1]  # certainty 0.2
     levels[0] = [1, 0]
-    where = Where(rows["ED-DC"], np.zeros((4, 3, 10, 10), int), levels)
-    table = where.calibration()
+    entry = Where(rows["ED-DC"], np.zeros((4, 3, 10, 10), int), levels)
+    table = entry.calibration()
     assert table.certainty.tolist() == pytest.approx([0, 0.2, 1])
     assert table.right.tolist() == pytest.approx([0, 0.2, 0.75])
     assert table.cells.tolist() == [1, 5, 4]
-    assert where.calibration_error() == pytest.approx(0.25 * 4 / 10)
+    assert entry.calibration_error() == pytest.approx(0.25 * 4 / 10)
 
 
 def test_a_row_without_predictions_is_named_and_the_rest_goes_on(tmp_path):
