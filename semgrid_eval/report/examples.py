@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
-from semgrid_eval.report.changes import flat
 from semgrid_eval.report.comparison import Headline, reference_of
 from semgrid_eval.report.reading import Result, Row, key_of
 from semgrid_eval.scores.iou import class_iou
@@ -147,8 +146,7 @@ def _asks_later(row: Row, main: Row) -> bool:
 
 def _but_horizon(row: Row) -> dict[str, object]:
     """Return what determined a row's numbers, but how far it looks ahead."""
-    config = flat(row.shown.record.config)
-    return {key: value for key, value in config.items() if not key.endswith("horizon_steps")}
+    return {key: value for key, value in row.shown.settings.items() if not key.endswith("horizon_steps")}
 
 
 def _row(rows: Sequence[Row], like: Row, model: str, experiment: str) -> Row | None:

@@ -54,6 +54,11 @@ class Result:
             return None
 
     @cached_property
+    def settings(self) -> Mapping[str, Any]:
+        """All that determined it, nested settings under dotted names: `network.depth`."""
+        return _flat(self.record.config)
+
+    @cached_property
     def places(self) -> Mapping[tuple[str, int], int]:
         """The index of each window by `key_of`."""
         return {key_of(window): i for i, window in enumerate(self.record.windows)}
@@ -122,6 +127,17 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
 def key_of(window: WindowRecord) -> tuple[str, int]:
     """Identify the target frame of a window across rows."""
     return window.recording, window.target_stamp_ns
+
+
+def _flat(config: Mapping[str, object], prefix: str = "") -> dict[str, Any]:
+    """Flatten nested settings to dotted names."""
+    found: dict[str, Any] = {}
+    for key, value in config.items():
+        if isinstance(value, Mapping):
+            found |= _flat(value, f"{prefix}{key}.")
+        else:
+            found[f"{prefix}{key}"] = value
+    return found
 
 
 def _tags(folders: Sequence[Path]) -> list[str]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 
-from semgrid_eval.report.changes import flat
 from semgrid_eval.report.paper import PAPER_DATASET, PAPER_REPEATS, PAPER_SETTINGS, PAPER_WINDOWS, paper_table
 from semgrid_eval.report.reading import Row, Run
 
@@ -28,8 +27,7 @@ def scaling(run: Run) -> str:
 
 def _values(rows: Sequence[Row], key: str) -> set[object]:
     """Collect the values of a setting that results state."""
-    configs = (flat(result.record.config) for row in rows for result in row.results)
-    return {config[key] for config in configs if key in config}
+    return {result.settings[key] for row in rows for result in row.results if key in result.settings}
 
 
 def _difference(text: str, ours: Iterable[object], theirs: float) -> str:

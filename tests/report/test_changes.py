@@ -3,14 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from semgrid_eval.report.changes import changed_settings, changes_table, flat
+from semgrid_eval.report.changes import changed_settings, changes_table
 from semgrid_eval.report.estimates import score_rows
 from semgrid_eval.report.reading import load_runs
 
 
 def test_settings_are_compared_key_by_key():
-    before = {"network": {"depth": 3, "features": 64}, "translate": True, "sensors": ["front"]}
-    after = {"network": {"depth": 4, "features": 64}, "translate": False, "sensors": ["a", "b"], "clip": None}
+    before = {"network.depth": 3, "network.features": 64, "translate": True, "sensors": ["front"]}
+    after = {"network.depth": 4, "network.features": 64, "translate": False, "sensors": ["a", "b"], "clip": None}
     assert changed_settings(before, after) == [
         "network.depth 3 to 4",
         "translate true to false",
@@ -18,10 +18,6 @@ def test_settings_are_compared_key_by_key():
         "clip not set to none",
     ]
     assert changed_settings(before, before) == []
-
-
-def test_nested_settings_get_dotted_names():
-    assert flat({"a": {"b": {"c": 1}}, "d": 2}) == {"a.b.c": 1, "d": 2}
 
 
 def _with_config(row, name, **config):

@@ -22,5 +22,9 @@ def test_the_grids_of_a_result_are_known_where_it_tells(result):
     assert result.grid is None
 
 
+def test_nested_settings_get_dotted_names(result):
+    assert with_config(result, a={"b": {"c": 1}}, d=2).settings == {"a.b.c": 1, "d": 2}
+
+
 def test_windows_are_found_by_their_target_frames(result):
     assert [result.places[key_of(window)] for window in result.record.windows] == list(range(16))
