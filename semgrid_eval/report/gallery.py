@@ -9,7 +9,7 @@ from semgrid_eval.report.comparison import Headline
 from semgrid_eval.report.examples import Contest, Pick, choose, choose_by_class, contests
 from semgrid_eval.report.glimpses import Glimpses
 from semgrid_eval.report.panels import Example, Shown, draw_examples
-from semgrid_eval.report.reading import Row, WindowReader
+from semgrid_eval.report.reading import Row, Run, WindowReader
 from semgrid_eval.scores.results import read_windows
 
 _BEST, _WORST, _OTHER = 3, 3, 1
@@ -36,12 +36,12 @@ class Group:
     shown: bool = False
 
 
-def example_groups(rows: Sequence[Row], found: Headline | None) -> list[Group]:
+def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | None) -> list[Group]:
     """Draw the example windows: the main contest, its classes, and one good and one bad window of the others."""
     chosen = contests(rows, found)
     if not chosen:
         return []
-    kept = {run: Glimpses(run) for run in dict.fromkeys(contest.model.run for contest in chosen)}
+    kept = {run.folder: Glimpses(run) for run in runs}
     main, *others = chosen
     plans = [
         {"": choose(main, best=_BEST, worst=_WORST), ", class by class": choose_by_class(main)},

@@ -1,51 +1,37 @@
 """What a run kept of the logs behind its windows: pictures, the drive, and how to find a window again."""
 
-import shlex
-from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
-from itertools import pairwise
-from pathlib import Path
 
 from semgrid_eval.errors import ResultError
-from semgrid_eval.report.reading import Result, Row
+from semgrid_eval.report.commands import play_command
+from semgrid_eval.report.reading import Result, Row, Run
 from semgrid_eval.scores.pictures import LogPictures, pictures_file, read_pictures
-from semgrid_eval.scores.results import WindowRecord, read_run
+from semgrid_eval.scores.results import WindowRecord, scored_digest
 
 _EPOCH_FROM_NS = 10**17  # stamps beyond 1973 are dates, smaller ones are times since the start of a log
 _LOGS_KEPT = 64  # in memory
 
 
 class Glimpses:
-    """What one run kept of its logs.
+    """What one run kept of its logs."""
 
-    Raises:
-        InputError: the run's record cannot be read.
-    """
-
-    def __init__(self, run: Path) -> None:
+    def __init__(self, run: Run) -> None:
         self._run = run
-        record = read_run(run)
-        self._command = record.command
-        self._digests = {(log.path, log.digest) for log in record.logs}
         self._read = lru_cache(_LOGS_KEPT)(self._read_log)
 
     def of(self, log: str, result: Result) -> LogPictures | None:
         """Return what was kept of a log that a result is scored on, None where that is nothing that can be read."""
-        # A log to train on may have the same path in another folder.
-        digest = next((digest for digest in result.record.log_digests if (log, digest) in self._digests), None)
-        return None if digest is None else self._read(digest, result.grid.camera if result.grid is not None else None)
+        digest = scored_digest(self._run.record, result.record, log)
+        return None if digest is None else self._read(digest, None if result.grid is None else result.grid.camera)
 
-    def play_command(self, row: Row, window: WindowRecord) -> str:
-        """Write the command that plays a window's recording, with the folders that the run's own command names."""
-        found = _options(self._command)
-        logs = found.get("--validation-logs", found.get("--logs", "LOGS"))
-        where = [found.get("--out", "RUN"), row.record.name, "--logs", logs]
-        return shlex.join(["semgrid-eval", "play", *where, "--recording", window.recording, "--out", "play.mcap"])
+    def command(self, row: Row, window: WindowRecord) -> str:
+        """Write the command that plays a window's recording."""
+        return play_command(self._run.record.command, row.record.name, window.recording)
 
     def _read_log(self, digest: str, camera: str | None) -> LogPictures | None:
         try:
-            return read_pictures(pictures_file(self._run, digest, camera))
+            return read_pictures(pictures_file(self._run.folder, digest, camera))
         except ResultError:
             return None
 
@@ -61,15 +47,3 @@ def times(stamp_ns: int, kept: LogPictures | None) -> tuple[str, ...]:
 def shown_date(stamp_ns: int) -> str:
     """Write a time stamp as a date."""
     return f"{datetime.fromtimestamp(stamp_ns // 10**9, UTC):%Y-%m-%d %H:%M:%S}.{stamp_ns % 10**9 // 10**6:03d} UTC"
-
-
-def _options(command: str) -> Mapping[str, str]:
-    """Read the options of a run's command line; empty where it is none."""
-    try:
-        words = shlex.split(command)
-    except ValueError:  # it was not written by a shell's rules
-        return {}
-    if words[:2] != ["semgrid-eval", "run"]:
-        return {}
-    spread = [part for word in words for part in (word.split("=", 1) if word.startswith("--") else [word])]
-    return {name: value for name, value in pairwise(spread) if name.startswith("--")}

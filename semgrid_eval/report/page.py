@@ -112,7 +112,7 @@ def render_page(material: Material) -> str:
     runs, scores = material.runs, material.scores
     found = headline(scores)
     rows = [entry.row for entry in scores.values()]
-    examples = example_groups(rows, found)
+    examples = example_groups(runs, rows, found)
     environment = Environment(
         loader=PackageLoader("semgrid_eval.report"),
         autoescape=True,

@@ -187,7 +187,7 @@ def draw_examples(shown: Shown, picks: Sequence[Pick], glimpses: Glimpses) -> It
             log=window.log,
             frame=window.target_frame,
             times=times(window.target_stamp_ns, kept),
-            command=glimpses.play_command(contest.model, window),
+            command=glimpses.command(contest.model, window),
             film=film,
             answers=answers,
             legend=_legend([*film, *answers], {HATCHED} if hatching else set()),

@@ -1,6 +1,5 @@
 """Where a report's numbers come from: failures, logs, results, versions and the commands that made them."""
 
-import shlex
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ import yaml
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.report.cells import Cell, Line, Table, plural
+from semgrid_eval.report.commands import row_command
 from semgrid_eval.report.reading import Row, Run
 from semgrid_eval.report.scaling import scaling
 
@@ -82,22 +82,6 @@ def matrix_text(run: Run) -> str:
 def matrix_file(run: Run, runs: Sequence[Run]) -> str:
     """Name the file beside the page that holds the run's matrix."""
     return "matrix.yaml" if len(runs) == 1 else f"matrix-{1 + runs.index(run)}.yaml"
-
-
-def row_command(command: str, row: str, matrix: str) -> str:
-    """Give the command line that makes one row: the run's own, narrowed to it, or one that reads the matrix file."""
-    try:
-        words = shlex.split(command)
-    except ValueError:  # it was not written by a shell's rules
-        words = []
-    if words[:2] != ["semgrid-eval", "run"]:
-        words = ["semgrid-eval", "run", matrix, "--logs", "LOGS", "--out", "RUN"]
-    kept, skip = [], False
-    for word in words:
-        if not skip and word != "--row" and not word.startswith("--row="):
-            kept.append(word)
-        skip = not skip and word == "--row"
-    return shlex.join([*kept, "--row", row])
 
 
 def command_table(runs: Sequence[Run]) -> Table:

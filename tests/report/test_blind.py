@@ -36,10 +36,11 @@ def shrunk(flags, cells):
 
 @pytest.mark.parametrize("place", [0, 1], ids=["turning", "straight"])
 def test_ground_in_blind_cells_is_in_no_input_but_in_the_target(seen, place):
-    row = next(row for row in load_runs([seen])[0].rows if row.name == "own-Sp2")
+    (run,) = load_runs([seen])
+    row = next(row for row in run.rows if row.name == "own-Sp2")
     window = row.shown.record.windows[place]
     arrays = read_arrays(windows_file(seen, row.shown.record.windows_id), ("inputs", "target"))
-    known = Glimpses(seen).of(window.log, row.shown)
+    known = Glimpses(run).of(window.log, row.shown)
     blind = blind_cells(known.drive, GridConfig(), SPLIT, window)
     inside = shrunk(blind, 2)  # cells at the edge are partly seen, and morphology spreads them
     inputs, target = np.isin(arrays["inputs"][place], GROUND).any(axis=(0, 1)), np.isin(arrays["target"][place], GROUND)

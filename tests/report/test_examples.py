@@ -98,6 +98,10 @@ def test_the_papers_contest_comes_first_and_others_follow(run):
     ]
 
 
+def test_where_nothing_is_scored_there_is_no_contest(run):
+    assert contests(list(_rows(run).values()), None) == []
+
+
 def test_longer_horizons_are_shown_in_a_row(tmp_path):
     kinds = (FakeRow("DC", "BL"), *(FakeRow(f"PH{k}", "ED", 0.1, 1, horizon_steps=k + 1) for k in (2, 1)))
     kinds = (*kinds, FakeRow("PH1", "BL", horizon_steps=2))

@@ -15,9 +15,9 @@ from semgrid_eval.scores.results import read_windows
 
 
 def gallery(run):
-    rows = load_runs([run])[0].rows
-    scored = [row for row in rows if row.windows]
-    return scored, example_groups(scored, headline(score_rows(scored, np.random.default_rng(0), draws=2)))
+    runs = load_runs([run])
+    scored = [row for row in runs[0].rows if row.windows]
+    return scored, example_groups(runs, scored, headline(score_rows(scored, np.random.default_rng(0), draws=2)))
 
 
 def test_contests_horizons_and_sensors_are_shown_and_explained(seen):
@@ -89,11 +89,11 @@ def test_damaged_pictures_are_left_out(seen, tmp_path):
 
 @pytest.mark.parametrize("lost", ["predictions.npz", "windows"])
 def test_lost_arrays_are_told_not_raised(tmp_path, lost):
-    run = make_fake_run(tmp_path / "run", recordings=2, windows=1)
-    rows = {row.name: row for row in load_runs([run])[0].rows}
+    (run,) = load_runs([make_fake_run(tmp_path / "run", recordings=2, windows=1)])
+    rows = {row.name: row for row in run.rows}
     contest = Contest(rows["ED-DC"], (rows["BL-DC"],))
     if lost == "windows":
-        shutil.rmtree(run / "windows")
+        shutil.rmtree(run.folder / "windows")
     for result in rows["ED-DC"].results if lost == "predictions.npz" else ():
         (result.folder / lost).unlink()
     (group,) = groups_of(contest, {"": choose(contest, best=1, worst=1)}, Glimpses(run))

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from semgrid_eval.report.examples import Contest, Pick, contests
+from semgrid_eval.report.examples import Contest, Pick
 from semgrid_eval.report.glimpses import Glimpses
 from semgrid_eval.report.panels import Shown, draw_examples
 from semgrid_eval.report.pictures import HATCH_LEGEND, MASK_LEGEND
@@ -12,12 +12,14 @@ from semgrid_eval.report.reading import load_runs
 PICK = Pick(0, "Largest", 0.25)
 
 
-def rows_of(run):
-    return {row.name: row for row in load_runs([run])[0].rows}
+def opened(folder):
+    """A run and its rows by name."""
+    (run,) = load_runs([folder])
+    return run, {row.name: row for row in run.rows}
 
 
-def draw(run, model, *rivals, picks=(PICK,), baselines=()):
-    rows = rows_of(run)
+def draw(folder, model, *rivals, picks=(PICK,), baselines=()):
+    run, rows = opened(folder)
     contest = Contest(rows[model], tuple(rows[name] for name in rivals), tuple(rows.get(name) for name in baselines))
     return list(draw_examples(Shown(contest, {pick.index for pick in picks}), picks, Glimpses(run)))
 
@@ -90,9 +92,6 @@ def test_horizons_stand_in_a_row_each_with_what_was_known_then(seen):
 
 
 def test_windows_are_those_of_the_same_target_whatever_their_order(seen):
-    rows = rows_of(seen)
-    found = contests(list(rows.values()), None)
-    assert found == []
     straight = draw(seen, "own-DC", "own-PH1", baselines=("BL-DC", "BL-PH1"), picks=(Pick(0, "a", 0), Pick(1, "b", 0)))
     turned = draw(seen, "own-DC", "own-PH1", baselines=("BL-DC", "BL-PH1"), picks=(Pick(1, "b", 0), Pick(0, "a", 0)))
     assert straight == turned[::-1]
@@ -112,10 +111,10 @@ def test_columns_are_neither_too_wide_nor_too_narrow(seen, lengths, expected):
 
 
 def test_a_rival_without_the_window_is_left_out(seen):
-    rows = rows_of(seen)
+    run, rows = opened(seen)
     rival = rows["BL-DC"]
     record = rival.shown.record.model_copy(update={"windows": rival.shown.record.windows[1:]})
     shorter = replace(rival, results=(replace(rival.shown, record=record, counts=rival.shown.counts[1:]),))
-    (example,) = draw_examples(Shown(Contest(rows["own-DC"], (shorter,)), {PICK.index}), (PICK,), Glimpses(seen))
+    (example,) = draw_examples(Shown(Contest(rows["own-DC"], (shorter,)), {PICK.index}), (PICK,), Glimpses(run))
     assert [column.title for column in example.answers] == ["own-DC", "Certainty"]
     assert np.all([column.pictures for column in example.answers])

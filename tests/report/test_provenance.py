@@ -1,32 +1,11 @@
-import shlex
 from dataclasses import replace
 
 import pytest
 import yaml
 
-from semgrid_eval.report.provenance import command_table, data_sets, duration, matrix_file, matrix_text, row_command
+from semgrid_eval.report.provenance import command_table, data_sets, duration, matrix_file, matrix_text
 from semgrid_eval.report.reading import load_runs
 from semgrid_eval.runs.matrix import load_matrix
-
-
-@pytest.mark.parametrize(
-    ("command", "expected"),
-    [
-        ("semgrid-eval run paper --logs L --out R", "semgrid-eval run paper --logs L --out R --row ED-DC"),
-        ("semgrid-eval run paper --row BL-DC --logs L --out R", "semgrid-eval run paper --logs L --out R --row ED-DC"),
-        ("semgrid-eval run paper --row=a --row b --logs L", "semgrid-eval run paper --logs L --row ED-DC"),
-        ("semgrid-eval run 'my matrix.yaml' --logs L", "semgrid-eval run 'my matrix.yaml' --logs L --row ED-DC"),
-        ("semgrid-eval demo", "semgrid-eval run matrix.yaml --logs LOGS --out RUN --row ED-DC"),
-        ("semgrid-eval run 'unclosed", "semgrid-eval run matrix.yaml --logs LOGS --out RUN --row ED-DC"),
-    ],
-)
-def test_a_rows_command_is_the_runs_own_narrowed_to_it(command, expected):
-    assert row_command(command, "ED-DC", "matrix.yaml") == expected
-
-
-def test_a_shell_reads_a_name_as_one_word():
-    name = 'it\'s $HOME; rm -rf "x" `y`\n'
-    assert shlex.split(row_command("semgrid-eval run paper --logs L", name, "matrix.yaml"))[-2:] == ["--row", name]
 
 
 def test_every_row_has_its_command_and_says_what_became_of_it(run):

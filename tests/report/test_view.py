@@ -19,9 +19,10 @@ SPLIT = ("split2_upper", "split2_lower")
 
 @pytest.fixture(scope="module")
 def view(seen):
-    row = next(row for row in load_runs([seen])[0].rows if row.name == "own-Sp2")
+    (run,) = load_runs([seen])
+    row = next(row for row in run.rows if row.name == "own-Sp2")
     window = row.shown.record.windows[1]
-    return View(window, Glimpses(seen).of(window.log, row.shown), GridConfig(), SPLIT)
+    return View(window, Glimpses(run).of(window.log, row.shown), GridConfig(), SPLIT)
 
 
 def decoded(uri):
