@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import CATEGORY_NAMES, CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.report.reading import Result, Row
-from semgrid_eval.scores.iou import Counts, category_iou, class_iou, merged_category_iou
+from semgrid_eval.scores.iou import Counts, category_iou, class_iou, mean_finite, merged_category_iou
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class RowScores:
     @cached_property
     def mean(self) -> dict[str, float]:
         """The mean over seeds of each column."""
-        return dict(zip(COLUMNS, _mean_finite(self.by_seed, axis=0).tolist(), strict=True))
+        return dict(zip(COLUMNS, mean_finite(self.by_seed, axis=0).tolist(), strict=True))
 
     def estimate(self, column: str) -> Estimate:
         """Give a column's mean over seeds with its interval."""
@@ -126,10 +126,3 @@ def _estimate(value: float, draws: Array) -> Estimate:
         return Estimate(value, np.nan, np.nan)
     low, high = np.quantile(finite, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return Estimate(value, float(low), float(high))
-
-
-def _mean_finite(values: Array, *, axis: int) -> Array:
-    present = np.isfinite(values)
-    number = present.sum(axis=axis)
-    total = np.where(present, values, 0.0).sum(axis=axis)
-    return np.asarray(np.divide(total, number, out=np.full(total.shape, np.nan), where=number > 0))

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, KNOWN_IDS
 from semgrid_eval.report.comparison import Headline, reference_of
 from semgrid_eval.report.reading import Result, Row, key_of
-from semgrid_eval.scores.iou import class_iou
+from semgrid_eval.scores.iou import class_iou, mean_finite
 from semgrid_eval.scores.results import WindowRecord
 
 MIN_CELLS = 10
@@ -80,7 +80,7 @@ def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
 def choose(contest: Contest, *, best: int, worst: int) -> list[Pick]:
     """Choose windows by the mean over classes: the largest values of the rule, then the smallest."""
     gaps = rule_values(contest)
-    values = _mean_finite(gaps[:, [i for i in range(CLASS_COUNT) if i != UNKNOWN]])
+    values = mean_finite(gaps[:, KNOWN_IDS])
     order = _ordered(values)
     top = _of_other_recordings(contest.result, order, best)
     left = _of_other_recordings(contest.result, order[~np.isin(order, top)][::-1], worst)
@@ -91,10 +91,10 @@ def choose(contest: Contest, *, best: int, worst: int) -> list[Pick]:
 def choose_by_class(contest: Contest) -> list[Pick]:
     """Choose, for each class but `unknown`, the window with the largest and the one with the smallest value."""
     gaps, picks = rule_values(contest), []
-    for index, name in enumerate(CLASS_NAMES):
-        order = _ordered(gaps[:, index]) if index != UNKNOWN else np.zeros(0, np.intp)
+    for index in KNOWN_IDS:
+        order = _ordered(gaps[:, index])
         ends = [(order[0], "largest"), (order[-1], "smallest")] if len(order) > 1 else [(i, "only") for i in order]
-        label = name.replace("_", " ").capitalize()
+        label = CLASS_NAMES[index].replace("_", " ").capitalize()
         picks += [Pick(int(i), f"{label}, {end}", float(gaps[i, index])) for i, end in ends]
     return picks
 
@@ -114,8 +114,7 @@ def mean_iou(result: Result, window: WindowRecord) -> float:
         return float("nan")
     counts = result.counts[[at]].astype(np.int64)
     values = np.where(counts.sum(axis=2) < MIN_CELLS, np.nan, class_iou(counts))
-    values[:, UNKNOWN] = np.nan
-    return float(_mean_finite(values)[0])
+    return float(mean_finite(values[0, KNOWN_IDS]))
 
 
 def rule_values(contest: Contest) -> Array:
@@ -175,10 +174,3 @@ def _of_other_recordings(result: Result, order: NDArray[np.intp], count: int) ->
     for i in order.tolist():
         taken.setdefault(result.record.windows[i].recording, i)
     return list(taken.values())[:count]
-
-
-def _mean_finite(values: Array) -> Array:
-    present = np.isfinite(values)
-    number = present.sum(axis=1)
-    total = np.where(present, values, 0.0).sum(axis=1)
-    return np.asarray(np.divide(total, number, out=np.full(len(values), np.nan), where=number > 0))

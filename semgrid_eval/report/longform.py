@@ -6,18 +6,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN, category_members
+from semgrid_eval.classes import CLASS_NAMES, category_members
 from semgrid_eval.report.estimates import CATEGORY_COLUMNS, COLUMNS, MERGED_COLUMNS, RowScores
-
-_KNOWN = tuple(i for i in range(CLASS_COUNT) if i != UNKNOWN)
+from semgrid_eval.scores.iou import averaged_members
 
 
 def members() -> dict[str, tuple[int, ...]]:
     """Return the class ids behind each of `estimates.COLUMNS`."""
-    categories = category_members()
     table: dict[str, tuple[int, ...]] = {name: (index,) for index, name in enumerate(CLASS_NAMES)}
-    table |= categories | {f"merged_{name}": ids for name, ids in categories.items()}
-    table |= {"static_known": tuple(i for i in categories["static"] if i != UNKNOWN), "mean_known": _KNOWN}
+    table |= averaged_members() | {f"merged_{name}": ids for name, ids in category_members().items()}
     return {name: table[name] for name in COLUMNS}
 
 

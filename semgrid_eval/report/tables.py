@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_NAMES, UNKNOWN
+from semgrid_eval.classes import CLASS_NAMES, KNOWN_IDS
 from semgrid_eval.report.cells import (
     ABSENT,
     Cell,
@@ -31,6 +31,7 @@ from semgrid_eval.report.estimates import (
 from semgrid_eval.report.longform import target_cells
 from semgrid_eval.report.paper import paper_table
 from semgrid_eval.report.where import BANDS, ORIGINS, Where
+from semgrid_eval.scores.iou import mean_finite
 
 Scores = Mapping[str, RowScores]
 
@@ -78,11 +79,9 @@ def window_means(scores: Scores) -> Table:
     for name, entry in scores.items():
         columns = [score_columns(result.counts.astype(np.int64)) for result in entry.row.results]
         values = np.concatenate(columns)[:, [COLUMNS.index(column) for column in CATEGORY_COLUMNS]]
-        present = np.isfinite(values)
-        total, count = np.where(present, values, 0.0).sum(axis=0), present.sum(axis=0)
-        means = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
-        behind = [f"{name}: {plural(int(n), 'window score')}, all seeds together; {_seeds(entry)}" for n in count]
-        rows.append((name, means, behind))
+        counts = np.isfinite(values).sum(axis=0)
+        behind = [f"{name}: {plural(int(n), 'window score')}, all seeds together; {_seeds(entry)}" for n in counts]
+        rows.append((name, mean_finite(values, axis=0), behind))
     caption = "Mean over windows of each window's own category scores; windows without a category are left out."
     return _plain_table("windows", caption, [LABELS[column] for column in CATEGORY_COLUMNS], rows)
 
@@ -208,7 +207,7 @@ def where_tables(found: Sequence[Where]) -> dict[str, Table | None]:
 
 def _cell_titles(entry: Where, *, axis: int) -> list[str]:
     """Count the target's known cells in each band of distance (axis 0) or origin (axis 1), for tooltips."""
-    known = entry.cells[..., np.arange(len(CLASS_NAMES)) != UNKNOWN, :]
+    known = entry.cells[..., KNOWN_IDS, :]
     counts = np.moveaxis(known, axis, 0).reshape(known.shape[axis], -1).sum(axis=1)
     shown = f"{plural(entry.row.windows, 'window')}; first repeat; no interval"
     return [f"{entry.row.name}: {plural(int(count), 'known target cell')}; {shown}" for count in counts]

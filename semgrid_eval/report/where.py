@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
+from semgrid_eval.classes import CLASS_COUNT, KNOWN_IDS, UNKNOWN
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.report.reading import Row, WindowReader
@@ -39,8 +39,8 @@ class Where:
 
     def origin_shares(self) -> NDArray[np.float64]:
         """Share of right cells among those the target knows, by what the inputs had seen of them: (origins,)."""
-        known = self.cells.sum(axis=0)[:, np.arange(CLASS_COUNT) != UNKNOWN]  # (origins, C - 1, C)
-        right = np.trace(known[:, :, np.arange(CLASS_COUNT) != UNKNOWN], axis1=1, axis2=2)
+        known = self.cells.sum(axis=0)[:, KNOWN_IDS]  # (origins, C - 1, C)
+        right = np.trace(known[:, :, KNOWN_IDS], axis1=1, axis2=2)
         total = known.sum(axis=(1, 2))
         return np.asarray(np.divide(right, total, out=np.full(len(ORIGINS), np.nan), where=total > 0))
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, UNKNOWN, category_members
+from semgrid_eval.classes import CLASS_COUNT, KNOWN_IDS, category_members
 
 Counts = NDArray[np.int64]
 Scores = NDArray[np.float64]
@@ -35,13 +35,16 @@ def class_iou(counts: Counts) -> Scores:
 def category_iou(iou: Scores) -> dict[str, Scores]:
     """Mean of the class IoUs of each category, as the paper: (..., C) -> a (...) for each category.
 
-    Classes that are absent (NaN) are left out of the mean. `static_known` is static without `unknown`, and
-    `mean_known` the mean of all classes without `unknown`.
+    Classes that are absent (NaN) are left out of the mean.
     """
-    members = dict(category_members())
-    members["static_known"] = tuple(i for i in members["static"] if i != UNKNOWN)
-    members["mean_known"] = tuple(i for i in range(CLASS_COUNT) if i != UNKNOWN)
-    return {name: _mean_present(iou[..., list(classes)]) for name, classes in members.items()}
+    return {name: mean_finite(iou[..., list(classes)]) for name, classes in averaged_members().items()}
+
+
+def averaged_members() -> dict[str, tuple[int, ...]]:
+    """Return the class ids behind each mean: the categories, `static_known` and `mean_known` without `unknown`."""
+    members = category_members()
+    known = tuple(i for i in members["static"] if i in KNOWN_IDS)
+    return members | {"static_known": known, "mean_known": KNOWN_IDS}
 
 
 def merged_category_iou(counts: Counts) -> dict[str, Scores]:
@@ -54,8 +57,9 @@ def merged_category_iou(counts: Counts) -> dict[str, Scores]:
     return {name: merged[..., column] for column, name in enumerate(names)}
 
 
-def _mean_present(values: Scores) -> Scores:
+def mean_finite(values: Scores, *, axis: int = -1) -> Scores:
+    """Mean of the values along an axis that are there, NaN where none is."""
     present = np.isfinite(values)
-    total = np.where(present, values, 0.0).sum(axis=-1)
-    number = present.sum(axis=-1)
+    total = np.where(present, values, 0.0).sum(axis=axis)
+    number = present.sum(axis=axis)
     return np.asarray(np.divide(total, number, out=np.full(total.shape, np.nan), where=number > 0))

@@ -5,7 +5,14 @@ from hypothesis import strategies as st
 from sklearn.metrics import confusion_matrix, jaccard_score
 
 from semgrid_eval.classes import CATEGORY_NAMES, CLASS_COUNT, CLASS_NAMES, category_members
-from semgrid_eval.scores.iou import category_iou, class_iou, confusion, merged_category_iou
+from semgrid_eval.scores.iou import (
+    averaged_members,
+    category_iou,
+    class_iou,
+    confusion,
+    mean_finite,
+    merged_category_iou,
+)
 
 
 def random_grids(seed, shape=(3, 7, 9), classes=CLASS_COUNT):
@@ -70,6 +77,20 @@ def test_category_value_is_the_mean_of_its_classes_that_are_present():
     assert categories["small_dynamic"] == pytest.approx(0.3)
     assert np.isnan(categories["small_static"])
     assert categories["mean_known"] == pytest.approx((0.8 + 0.5 + 0.4 + 0.2) / 4)
+
+
+def test_what_is_known_is_everything_but_unknown():
+    members = averaged_members()
+    assert [CLASS_NAMES[i] for i in members["static_known"]] == ["road", "sidewalk", "building", "vegetation"]
+    assert [CLASS_NAMES[i] for i in members["mean_known"]] == list(CLASS_NAMES[1:])
+    assert {name: members[name] for name in CATEGORY_NAMES} == category_members()
+
+
+def test_a_mean_leaves_out_what_is_absent_along_either_axis():
+    nan = np.nan
+    values = np.array([[1.0, nan, nan], [3.0, 2.0, nan]])
+    np.testing.assert_array_equal(mean_finite(values), [1.0, 2.5])
+    np.testing.assert_array_equal(mean_finite(values, axis=0), [2.0, 2.0, nan])
 
 
 def test_merged_categories_do_not_punish_confusion_within_one():
