@@ -2,8 +2,6 @@
 
 import base64
 import io
-import struct
-import zlib
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,6 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, NO_POINT, class_palette
+from semgrid_eval.frames.png import decode_ids
 from semgrid_eval.report.colours import class_colours, hex_colour
 
 Grid = NDArray[np.uint8]
@@ -22,7 +21,6 @@ HATCH_COLOUR = (0, 255, 255)
 RIGHT_COLOURS = ((0, 0, 0), (128, 132, 138), (0, 114, 178), (230, 159, 0), (90, 60, 90), (255, 255, 255))
 RIGHT_LABELS = ("unknown in all", "both right", "only the model right", "only the baseline right", "both wrong", "M")
 _CERTAINTY_LEVELS = 16
-_MAX_LABEL_PIXELS = 1 << 22  # runs keep small ones
 _HATCH_SCALE, _HATCH_STEP = 3, 11  # pixels of an edge of a cell, and from line to line
 
 CLASS_LEGEND = class_colours()
@@ -69,27 +67,16 @@ def grid_png(grid: Grid, mask: NDArray[np.bool_] | None = None) -> bytes:
     return _png(shown, _class_palette())
 
 
-def label_classes(label: bytes, class_by_label: Grid) -> Grid:
-    """Decode label ids from a PNG file and look up their grid classes, `NO_POINT` for those in no grid: (H, W).
+def label_picture(title: str, alt: str, label: bytes, class_by_label: Grid) -> Picture:
+    """Make the picture of a label image, a PNG file of ids, in the colours of grids, what is in no grid in light gray.
 
     Raises:
-        ValueError: the file is damaged.
+        InputError: the file is damaged or too large.
     """
-    try:
-        with Image.open(io.BytesIO(label), formats=["PNG"]) as picture:
-            if picture.width * picture.height > _MAX_LABEL_PIXELS:
-                raise ValueError(f"a label image of {picture.width} x {picture.height} is too large")
-            ids = np.asarray(picture)
-    except (OSError, SyntaxError, struct.error, zlib.error, Image.DecompressionBombError) as error:
-        raise ValueError(f"a label image is damaged: {error}") from error
-    if ids.ndim != 2 or ids.dtype != np.uint8:
-        raise ValueError(f"a label image has shape {ids.shape}, type {ids.dtype}")
-    return np.asarray(class_by_label[ids], np.uint8)
-
-
-def label_png(classes: Grid) -> bytes:
-    """Draw the classes of a label image (H, W) in the colours of grids, what is in no grid in a light gray."""
-    return _png(np.where(classes == NO_POINT, POINTLESS, classes).astype(np.uint8), _class_palette())
+    classes = class_by_label[decode_ids(label)]
+    shown = np.where(classes == NO_POINT, POINTLESS, classes).astype(np.uint8)
+    there = np.unique(shown).tolist()
+    return Picture(title, alt, data_uri(_png(shown, _class_palette())), "labels", colours=frozenset(there))
 
 
 def hatch_png(cells: NDArray[np.bool_]) -> bytes:

@@ -1,14 +1,13 @@
 """What the camera saw of one window: small pictures, the sensors' parts of the image, and the ground that none sees."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
-import numpy as np
-
-from semgrid_eval.classes import NO_POINT
+from semgrid_eval.errors import InputError
 from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
 from semgrid_eval.report.blind import blind_cells
-from semgrid_eval.report.pictures import POINTLESS, Picture, data_uri, hatch_png, label_classes, label_png
+from semgrid_eval.report.pictures import Picture, data_uri, hatch_png, label_picture
 from semgrid_eval.scores.pictures import LogPictures
 from semgrid_eval.scores.results import WindowRecord
 
@@ -47,13 +46,9 @@ class View:
         files = self.kept.frames[stamp_ns]
         if files.image:
             yield Picture("Camera", f"Camera image, {moment}", data_uri(files.image, "image/webp"), kind="camera")
-        try:
-            classes = label_classes(files.label, self.grid.class_by_label())
-        except ValueError:
-            return  # there is none, or it is damaged
-        there = np.unique(np.where(classes == NO_POINT, POINTLESS, classes)).tolist()
-        uri = data_uri(label_png(classes))
-        yield Picture("Segmentation", f"Segmentation, {moment}", uri, kind="labels", colours=frozenset(there))
+        with suppress(InputError):  # there is none, or it is damaged
+            title = "Segmentation"
+            yield label_picture(title, f"{title}, {moment}", files.label, self.grid.class_by_label())
 
     def before(self, stamp_ns: int | None) -> str:
         """Tell how long before the target a time is."""

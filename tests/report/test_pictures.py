@@ -8,8 +8,18 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
 
-from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, class_palette
-from semgrid_eval.report.pictures import RIGHT_COLOURS, certainty_png, data_uri, grid_png, label_classes, right_png
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, MASK_COLOUR, class_map, class_palette
+from semgrid_eval.errors import InputError
+from semgrid_eval.report.pictures import (
+    POINTLESS,
+    POINTLESS_COLOUR,
+    RIGHT_COLOURS,
+    certainty_png,
+    data_uri,
+    grid_png,
+    label_picture,
+    right_png,
+)
 
 GRIDS = arrays(np.uint8, (5, 7), elements=st.integers(0, CLASS_COUNT - 1))
 
@@ -25,12 +35,22 @@ def test_each_cell_has_its_class_colour_and_the_mask_is_white(grid, mask):
     np.testing.assert_array_equal(got[~mask], class_palette(safe=True)[grid[~mask]])
 
 
-@pytest.mark.parametrize("side_px", [3_000, 20_000])
-def test_a_label_image_that_is_too_large_is_not_decoded(side_px):
+def test_a_label_image_has_the_colours_of_its_classes_and_a_gray_for_what_is_in_no_grid():
     stream = io.BytesIO()
-    Image.new("1", (side_px, side_px)).save(stream, "PNG")
-    with pytest.raises(ValueError, match="a label image"):
-        label_classes(stream.getvalue(), np.zeros(256, np.uint8))
+    Image.fromarray(np.array([[7, 23], [8, 7]], np.uint8)).save(stream, "PNG")
+    picture = label_picture("Segmentation", "Street", stream.getvalue(), class_map())
+    road, sidewalk = (CLASS_NAMES.index(name) for name in ("road", "sidewalk"))
+    got = _colours(base64.b64decode(picture.uri.removeprefix("data:image/png;base64,")))
+    palette = [*class_palette(safe=True).tolist(), MASK_COLOUR, POINTLESS_COLOUR]
+    np.testing.assert_array_equal(got, np.array(palette)[[[road, POINTLESS], [sidewalk, road]]])
+    assert picture.colours == {road, sidewalk, POINTLESS}
+
+
+def test_a_label_image_that_is_too_large_is_not_decoded():
+    stream = io.BytesIO()
+    Image.new("1", (20_000, 20_000)).save(stream, "PNG")
+    with pytest.raises(InputError, match="pixels are allowed"):
+        label_picture("", "", stream.getvalue(), class_map())
 
 
 def test_who_is_right_names_each_case():
