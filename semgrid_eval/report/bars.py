@@ -1,7 +1,7 @@
 """The paper's Fig. 5: category scores of every experiment as bars, with intervals and the paper's own values."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import matplotlib as mpl
@@ -10,12 +10,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from semgrid_eval.classes import CATEGORY_NAMES
-from semgrid_eval.report.estimates import RowScores
-from semgrid_eval.report.figure import INK, MUTED, PALETTE, PAPER_MARKS, RULE, SETTINGS, Plot, evidence, finish, short
+from semgrid_eval.report.estimates import LABELS, RowScores, Scores
+from semgrid_eval.report.figure import (
+    INK,
+    MUTED,
+    PALETTE,
+    PAPER_MARKS,
+    RULE,
+    SETTINGS,
+    Plot,
+    evidence,
+    finish,
+    paper_note,
+    short,
+)
 from semgrid_eval.report.paper import paper_table
-from semgrid_eval.report.tables import LABELS
-
-Scores = Mapping[str, RowScores]
 
 _GROUPS = {"Sp": "SF: sensors fused", "SL": "SL: inputs", "PH": "PH: horizon"}
 _GROUP = re.compile(r"(Sp|SL|PH)\d")
@@ -75,9 +84,7 @@ def category_plot(scores: Scores, categories: Sequence[str], name: str) -> Plot:
         for axes, category in zip(np.atleast_1d(figure.subplots(lines, columns)).ravel(), categories, strict=True):
             _panel(axes, scores, category, layout)
         words = ", ".join(LABELS[category].lower() for category in categories)
-        caption = f"IoU of {words} by experiment ({evidence(scores)}); lines are 95% intervals"
-        beside = any(entry.row.record.name in paper_table() for entry in scores.values())
-        caption += "; diamonds are the paper's values, on Cityscapes." if beside else "."
+        caption = f"IoU of {words} by experiment ({evidence(scores)}); lines are 95% intervals{paper_note(scores)}"
         return finish(figure, name, "summary.csv", caption)
 
 

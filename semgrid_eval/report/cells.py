@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from semgrid_eval.report.comparison import verdict
 from semgrid_eval.report.estimates import LEVEL, Estimate
 
 ABSENT = "\N{EN DASH}"
@@ -78,10 +79,10 @@ def value_cell(estimate: Estimate, *, title: str = "", best: bool = False) -> Ce
     return Cell(number(estimate.value), _sortable(estimate.value), interval(estimate), title, "best" if best else "")
 
 
-def difference_cell(difference: Estimate, verdict: str, *, title: str = "") -> Cell:
+def difference_cell(difference: Estimate, *, title: str = "") -> Cell:
     """Show a difference with its interval, toned by its verdict."""
     note = interval(difference, with_sign=True)
-    return Cell(signed(difference.value), _sortable(difference.value), note, title, verdict)
+    return Cell(signed(difference.value), _sortable(difference.value), note, title, verdict(difference))
 
 
 def plain_cell(value: float, *, title: str = "") -> Cell:

@@ -3,11 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from semgrid_eval.report.cells import Cell, Line, Table, difference_cell, interval_phrase, plural
-from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, verdict
-from semgrid_eval.report.estimates import RowScores
-from semgrid_eval.report.tables import LABELS
-
-Scores = Mapping[str, RowScores]
+from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS
+from semgrid_eval.report.estimates import LABELS, RowScores, Scores
 
 _UNSET = "not set"
 
@@ -50,7 +47,7 @@ def _difference(entry: RowScores, base: RowScores, column: str) -> Cell:
     difference = entry.minus(base, column)
     title = f"{plural(entry.row.windows, 'window')}; {plural(len(entry.row.results), 'result')}"
     title += f"; {interval_phrase(difference, with_sign=True)}"
-    return difference_cell(difference, verdict(difference), title=title)
+    return difference_cell(difference, title=title)
 
 
 def _text(value: object) -> str:

@@ -1,11 +1,11 @@
 """Which row is compared with which, and what the numbers then say in plain sentences."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from semgrid_eval.report.estimates import Estimate, RowScores
+from semgrid_eval.report.estimates import Estimate, Scores
 from semgrid_eval.report.reading import Row
 
 HEADLINE = "mean_known"
@@ -36,7 +36,7 @@ def reference_of(row: Row, rows: Sequence[Row]) -> Row | None:
     return max(choices, key=lambda other: _nearness(row, other), default=None)
 
 
-def headline(scores: Mapping[str, RowScores]) -> Headline | None:
+def headline(scores: Scores) -> Headline | None:
     """Find the best row among those that answer the same question; None where nothing is scored."""
     rows = [entry.row for entry in scores.values() if np.isfinite(entry.mean[HEADLINE])]
     if not rows:

@@ -1,6 +1,6 @@
 """The figures behind the scores: how honest certainty is, and what depth and features of the network buy."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -12,11 +12,9 @@ from matplotlib.ticker import FuncFormatter
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.report.comparison import HEADLINE
-from semgrid_eval.report.estimates import Estimate, RowScores
-from semgrid_eval.report.figure import INK, PALETTE, SETTINGS, STROKES, Plot, evidence, finish, short
+from semgrid_eval.report.estimates import Estimate, RowScores, Scores
+from semgrid_eval.report.figure import INK, PALETTE, SETTINGS, Plot, evidence, finish, line_style, short
 from semgrid_eval.report.where import Where
-
-Scores = Mapping[str, RowScores]
 
 BUILD_COLUMNS = ("row", "depth", "features", "parameters", "iou", "low", "high", "window_ms")
 
@@ -45,11 +43,7 @@ def calibration_plots(found: Sequence[Where]) -> list[Plot]:
         right, cells = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
         right.plot([0, 1], [0, 1], color=INK, linewidth=0.8, linestyle=":")
         for index, (entry, table) in enumerate(curves, start=1):
-            style: Any = {
-                "color": PALETTE[index % len(PALETTE)],
-                "linestyle": STROKES[index // len(PALETTE) % len(STROKES)],
-                "label": f"{short(entry.row.name)}, error {entry.calibration_error():.3f}",
-            }
+            style = line_style(index) | {"label": f"{short(entry.row.name)}, error {entry.calibration_error():.3f}"}
             right.plot(table.certainty, table.right, marker="o", markersize=3, **style)
             cells.plot(table.certainty, table.cells / table.cells.sum(), linewidth=1.2, **style)
         right.set(ylabel="share of right cells", xlim=(0, 1), ylim=(0, 1))
@@ -140,9 +134,8 @@ def _build(entry: RowScores) -> Build | None:
     known = isinstance(network, dict) and {"depth", "features"} <= set(network)
     if entry.row.is_baseline or not known or not np.isfinite(entry.mean[HEADLINE]):
         return None
-    seconds = float(np.mean([result.record.predict_seconds for result in entry.row.results]))
     rest = {key: value for key, value in network.items() if key not in ("depth", "features")}
     setting = digest_value([{**record.config, "network": rest}, row.horizon_steps, str(entry.row.run)])
     depth, features = int(network["depth"]), int(network["features"])
-    window_ms = 1000 * seconds / max(1, entry.row.windows)
+    window_ms = float(np.mean(entry.row.window_ms))
     return Build(entry.row.name, depth, features, record.parameters, entry.estimate(HEADLINE), window_ms, setting)

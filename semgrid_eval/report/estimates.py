@@ -3,7 +3,7 @@
 Every row of a report is resampled with the same draws of recordings, so that differences between rows are paired.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,6 +22,20 @@ CATEGORY_COLUMNS = ("static", "static_known", "small_static", "vehicles", "small
 MERGED_COLUMNS = tuple(f"merged_{name}" for name in CATEGORY_NAMES)
 COLUMNS = (*CLASS_NAMES, *CATEGORY_COLUMNS, *MERGED_COLUMNS)
 """Everything that is scored: the classes, the categories, and the categories with their classes merged."""
+LABELS = {
+    "static": "Static",
+    "static_known": "Static (known)",
+    "small_static": "Small static",
+    "vehicles": "Vehicles",
+    "small_dynamic": "Small dynamic",
+    "mean_known": "Mean (known)",
+    **{name: name.replace("_", " ") for name in CLASS_NAMES},
+    "merged_static": "Static (merged)",
+    "merged_small_static": "Small static (merged)",
+    "merged_vehicles": "Vehicles (merged)",
+    "merged_small_dynamic": "Small dynamic (merged)",
+}
+"""Each of `COLUMNS` in words."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +72,10 @@ class RowScores:
     def minus(self, other: "RowScores", column: str) -> Estimate:
         """Give the paired difference to another row."""
         return weighted_sum([(1, self), (-1, other)], column)
+
+
+Scores = Mapping[str, RowScores]
+"""Rows' scores by their names."""
 
 
 def weighted_sum(parts: Sequence[tuple[float, RowScores]], column: str) -> Estimate:

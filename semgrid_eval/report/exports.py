@@ -12,7 +12,7 @@ from semgrid_eval.files import write_json, write_text
 from semgrid_eval.report.cells import ABSENT
 from semgrid_eval.report.comparison import reference_of
 from semgrid_eval.report.diagrams import architecture_frame
-from semgrid_eval.report.estimates import CATEGORY_COLUMNS, COLUMNS, DRAWS, LEVEL, Estimate, RowScores
+from semgrid_eval.report.estimates import CATEGORY_COLUMNS, COLUMNS, DRAWS, LABELS, LEVEL, Estimate, RowScores, Scores
 from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, finding_frame, finding_records
 from semgrid_eval.report.longform import category_table, class_table
@@ -21,7 +21,6 @@ from semgrid_eval.report.provenance import data_sets, failures, matrix_file, mat
 from semgrid_eval.report.reading import Result, Row, Run
 from semgrid_eval.report.regions import region_frame
 from semgrid_eval.report.scaling import scaling
-from semgrid_eval.report.tables import LABELS
 from semgrid_eval.report.where import BANDS, ORIGINS, Where
 
 RECORD = "report.json"
@@ -41,8 +40,6 @@ _LATEX = str.maketrans(
         "*": "{*}",
     }
 )
-
-Scores = Mapping[str, RowScores]
 
 
 def write_tables(

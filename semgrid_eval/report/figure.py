@@ -2,7 +2,6 @@
 
 import io
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +11,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from semgrid_eval.report.cells import plural
-from semgrid_eval.report.estimates import RowScores
+from semgrid_eval.report.estimates import Scores
+from semgrid_eval.report.paper import paper_table
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart; the first two are those of BL and ED.
 PALETTE = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
@@ -74,13 +74,25 @@ class Plot:
         return f"{head}{style}<defs>{tail}"
 
 
-def evidence(scores: Mapping[str, RowScores]) -> str:
+def evidence(scores: Scores) -> str:
     """Count the windows and recordings behind a figure's rows."""
     windows = {entry.row.windows for entry in scores.values()}
     records = (w for entry in scores.values() for w in entry.row.results[0].record.windows)
     recordings = len({window.recording for window in records})
     count = plural(max(windows), "window") if len(windows) == 1 else f"{min(windows)} to {max(windows)} windows"
     return f"{count} a row, {plural(recordings, 'recording')}"
+
+
+def paper_note(scores: Scores) -> str:
+    """End a caption, saying what the diamonds are where the paper has any of the rows."""
+    beside = any(entry.row.record.name in paper_table() for entry in scores.values())
+    return "; diamonds are the paper's values, on Cityscapes." if beside else "."
+
+
+def line_style(index: int) -> dict[str, Any]:
+    """Give the colour and stroke of one of many lines."""
+    colours = len(PALETTE)
+    return {"color": PALETTE[index % colours], "linestyle": STROKES[index // colours % len(STROKES)]}
 
 
 def short(name: str) -> str:

@@ -11,12 +11,8 @@ import pandas as pd
 
 from semgrid_eval.report.cells import ABSENT, MINUS, Cell, Line, Table, difference_cell, interval_phrase, plural
 from semgrid_eval.report.claims import MARGIN, WINDOW_MS, Check, Claim, Rule, claims
-from semgrid_eval.report.comparison import verdict
-from semgrid_eval.report.estimates import Estimate, RowScores, weighted_sum
+from semgrid_eval.report.estimates import LABELS, Estimate, RowScores, Scores, weighted_sum
 from semgrid_eval.report.reading import Run
-from semgrid_eval.report.tables import LABELS
-
-Scores = Mapping[str, RowScores]
 
 TRUTH = "logs that tell where true actors move"
 
@@ -181,13 +177,9 @@ def _outcome(check: Check, places: Mapping[str, Scores]) -> Outcome:
 
 def _time_difference(check: Check, rows: Scores) -> Estimate:
     """Take the mean over pairs of rows, and the range of the pairs in place of an interval."""
-    gaps = [_window_ms(rows[first]) - _window_ms(rows[second]) for first, second in check.pairs]
+    gaps = [float(np.mean(rows[a].row.window_ms) - np.mean(rows[b].row.window_ms)) for a, b in check.pairs]
     several = len(gaps) > 1
     return Estimate(float(np.mean(gaps)), min(gaps) if several else np.nan, max(gaps) if several else np.nan)
-
-
-def _window_ms(entry: RowScores) -> float:
-    return 1000 * float(np.mean([result.record.predict_seconds for result in entry.row.results])) / entry.row.windows
 
 
 def _body(finding: Finding) -> tuple[Line, ...]:
@@ -204,7 +196,7 @@ def _line(outcome: Outcome) -> Line:
         return Line(check.text, (_verdict_cell(outcome.verdict), Cell("ms a window"), _time_cell(difference)), "part")
     label = LABELS[check.score] + (f", {check.region}" if check.region else "")
     title = f"{interval_phrase(difference, with_sign=True)}; {plural(outcome.windows, 'window')}"
-    number = difference_cell(difference, verdict(difference), title=title)
+    number = difference_cell(difference, title=title)
     return Line(check.text, (_verdict_cell(outcome.verdict), Cell(label), number), "part")
 
 

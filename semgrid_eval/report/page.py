@@ -20,7 +20,7 @@ from semgrid_eval.report.changes import changes_table
 from semgrid_eval.report.claims import MARGIN
 from semgrid_eval.report.colours import class_style
 from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, Headline, headline
-from semgrid_eval.report.estimates import RowScores, score_rows
+from semgrid_eval.report.estimates import Scores, score_rows
 from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, find, finding_table, missing_table, sentence
 from semgrid_eval.report.gallery import example_groups, gaps
@@ -33,8 +33,6 @@ from semgrid_eval.report.where import Where, locate_rows
 
 PAGE = "index.html"
 _SEED = 20190623  # any number does; a fixed one gives the same run the same intervals
-
-Scores = Mapping[str, RowScores]
 
 
 @dataclass(frozen=True)

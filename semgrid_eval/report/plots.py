@@ -1,6 +1,6 @@
 """The curves of a report: scores over the horizon, and losses over epochs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -11,13 +11,20 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import StrMethodFormatter
 
 from semgrid_eval.classes import CATEGORY_NAMES
-from semgrid_eval.report.estimates import RowScores
-from semgrid_eval.report.figure import PALETTE, PAPER_MARKS, SETTINGS, STROKES, Plot, evidence, finish, short
+from semgrid_eval.report.estimates import LABELS, RowScores, Scores
+from semgrid_eval.report.figure import (
+    PALETTE,
+    PAPER_MARKS,
+    SETTINGS,
+    Plot,
+    evidence,
+    finish,
+    line_style,
+    paper_note,
+    short,
+)
 from semgrid_eval.report.paper import paper_table
 from semgrid_eval.report.reading import Row
-from semgrid_eval.report.tables import LABELS
-
-Scores = Mapping[str, RowScores]
 
 HISTORY_COLUMNS = ("epoch", "updates", "learning_rate", "loss", "validation_loss", "seconds")
 
@@ -70,9 +77,7 @@ def horizon_plots(scores: Scores) -> list[Plot]:
         figure.axes[0].set_ylabel("IoU")
         figure.axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
         figure.supxlabel("steps from the newest input to the target, and the mean time that they take", fontsize=9)
-        caption = f"Category IoU over the horizon with 95% intervals ({evidence(drawn)})"
-        beside = any(entry.row.record.name in paper_table() for entry in drawn.values())
-        caption += "; diamonds are the paper's values, on Cityscapes." if beside else "."
+        caption = f"Category IoU over the horizon with 95% intervals ({evidence(drawn)}){paper_note(drawn)}"
         return [finish(figure, "horizon", "summary.csv", caption)]
 
 
@@ -111,18 +116,18 @@ def _horizon_lines(scores: Scores) -> dict[str, list[RowScores]]:
 
 
 def _training_curves(axes: Axes, row: Row, index: int) -> None:
-    colour, stroke = PALETTE[index % len(PALETTE)], STROKES[index // len(PALETTE) % len(STROKES)]
+    style = line_style(index)
     curves = [_curve(result.history, "loss") for result in row.results]
     for curve in curves:
-        axes.plot(range(1, len(curve) + 1), curve, color=colour, linestyle=stroke, linewidth=0.7, alpha=0.6)
+        axes.plot(range(1, len(curve) + 1), curve, linewidth=0.7, alpha=0.6, **style)
     checks = [_curve(result.history, "validation_loss") for result in row.results]
     shortest = min((len(check) for check in checks if check), default=0)
     mean = np.array([check[:shortest] for check in checks if check], np.float64).reshape(-1, shortest).mean(axis=0)
     label = short(row.name)
     if np.isfinite(mean).any():
-        axes.plot(range(1, shortest + 1), mean, color=colour, linestyle=stroke, linewidth=2, label=label)
+        axes.plot(range(1, shortest + 1), mean, linewidth=2, label=label, **style)
     else:
-        axes.plot([], [], color=colour, linestyle=stroke, label=label)
+        axes.plot([], [], label=label, **style)
 
 
 def _curve(history: Any, column: str) -> list[float]:  # noqa: ANN401 - a data frame or None

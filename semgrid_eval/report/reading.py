@@ -77,7 +77,7 @@ class Row:
     @property
     def is_baseline(self) -> bool:
         """Whether the row is one of the model-driven baselines, which need no training."""
-        return self.record.model == "BL" or self.record.model.startswith("BL-")
+        return self.record.model == "BL"
 
     @property
     def shown(self) -> Result:
@@ -94,6 +94,11 @@ class Row:
     def windows(self) -> int:
         """Windows behind the row's scores."""
         return max((len(result.counts) for result in self.results), default=0)
+
+    @property
+    def window_ms(self) -> tuple[float, ...]:
+        """The mean time of a window's prediction by result."""
+        return tuple(1000 * result.record.predict_seconds / self.windows for result in self.results)
 
 
 @dataclass(frozen=True)

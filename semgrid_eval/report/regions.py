@@ -8,13 +8,11 @@ import pandas as pd
 
 from semgrid_eval.report.cells import ABSENT, Cell, Line, Table
 from semgrid_eval.report.comparison import reference_of
-from semgrid_eval.report.estimates import Estimate, RowScores, score_rows
+from semgrid_eval.report.estimates import Estimate, Scores, score_rows
 from semgrid_eval.report.longform import target_cells
 from semgrid_eval.report.reading import Result, Row
 from semgrid_eval.report.tables import difference_table, value_table
 from semgrid_eval.scores.results import REGIONS
-
-Scores = Mapping[str, RowScores]
 
 SHOWN = ("vehicles", "person", "bicycle")
 """What the page shows; `regions.csv` has the classes of vehicles and the category of small dynamic ones, too."""

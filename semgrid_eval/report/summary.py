@@ -1,15 +1,13 @@
 """What the numbers say, in a few plain sentences and a few large figures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from semgrid_eval.report.cells import interval, interval_phrase, number, plural, signed
 from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, HEADLINE, Headline, verdict
-from semgrid_eval.report.estimates import Estimate, RowScores
+from semgrid_eval.report.estimates import LABELS, Estimate, Scores
 from semgrid_eval.report.reading import Row, Run, key_of
-from semgrid_eval.report.tables import LABELS
 
-Scores = Mapping[str, RowScores]
 _FEW_RECORDINGS = 10
 _WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
 

@@ -23,9 +23,11 @@ from semgrid_eval.report.comparison import reference_of, verdict
 from semgrid_eval.report.estimates import (
     CATEGORY_COLUMNS,
     COLUMNS,
+    LABELS,
     MERGED_COLUMNS,
     Estimate,
     RowScores,
+    Scores,
     score_columns,
 )
 from semgrid_eval.report.longform import target_cells
@@ -33,25 +35,10 @@ from semgrid_eval.report.paper import paper_table
 from semgrid_eval.report.where import BANDS, ORIGINS, Where
 from semgrid_eval.scores.iou import mean_finite
 
-Scores = Mapping[str, RowScores]
-
 _PAPER = (
     "The paper's values (Table A1) come from Cityscapes' validation set; "
     "differences to them are marked where the row's interval leaves them out."
 )
-LABELS = {
-    "static": "Static",
-    "static_known": "Static (known)",
-    "small_static": "Small static",
-    "vehicles": "Vehicles",
-    "small_dynamic": "Small dynamic",
-    "mean_known": "Mean (known)",
-    **{name: name.replace("_", " ") for name in CLASS_NAMES},
-    "merged_static": "Static (merged)",
-    "merged_small_static": "Small static (merged)",
-    "merged_vehicles": "Vehicles (merged)",
-    "merged_small_dynamic": "Small dynamic (merged)",
-}
 
 
 def value_table(name: str, caption: str, scores: Scores, columns: Sequence[str], *, beside_paper: bool = True) -> Table:
@@ -93,12 +80,7 @@ def difference_table(name: str, scores: Scores, columns: Sequence[str]) -> Table
         reference = reference_of(entry.row, rows)
         if reference is None:
             continue
-        differences = {column: entry.minus(scores[reference.name], column) for column in columns}
-        cells = [
-            difference_cell(d, verdict(d), title=f"{_evidence(entry, c)}; difference: {_interval_text(d)}")
-            for c, d in differences.items()
-        ]
-        bodies.append((Line(f"{entry.row.name} \N{MINUS SIGN} {reference.name}", tuple(cells)),))
+        bodies.append((_difference_line(entry, scores[reference.name], columns),))
     kind = "by class" if set(columns) <= set(CLASS_NAMES) else "by category"
     caption = f"Differences to the baseline {kind}, resampled together. Marked where the interval excludes zero."
     return Table(name, caption, "Rows", _headers(scores, columns), tuple(bodies)) if bodies else None
@@ -116,13 +98,7 @@ def run_differences(scores: Scores, tags: Sequence[str], columns: Sequence[str])
         groups.setdefault(entry.row.record.name, []).append(entry)
     bodies = []
     for group in groups.values():
-        for entry in group[1:]:
-            differences = [entry.minus(group[0], column) for column in columns]
-            cells = tuple(
-                difference_cell(d, verdict(d), title=f"{_evidence(entry, c)}; difference: {_interval_text(d)}")
-                for c, d in zip(columns, differences, strict=True)
-            )
-            bodies.append((Line(f"{entry.row.name} \N{MINUS SIGN} {group[0].row.name}", cells),))
+        bodies += [(_difference_line(entry, group[0], columns),) for entry in group[1:]]
     caption = f"The same rows in several runs: differences to {tags[0] if tags else 'the first run'}."
     return Table("runs", caption, "Rows", _headers(scores, columns), tuple(bodies)) if bodies else None
 
@@ -148,6 +124,14 @@ def _paper_gap(entry: RowScores, column: str, paper: float) -> Cell:
     gap = Estimate(mine.value - paper, mine.low - paper, mine.high - paper)
     title = f"{_evidence(entry, column)}; less the paper's {number(paper)}: {_interval_text(gap)}"
     return Cell(signed(gap.value), gap.value if np.isfinite(gap.value) else None, title=title, tone=verdict(gap))
+
+
+def _difference_line(entry: RowScores, other: RowScores, columns: Sequence[str]) -> Line:
+    differences = [(column, entry.minus(other, column)) for column in columns]
+    cells = tuple(
+        difference_cell(d, title=f"{_evidence(entry, c)}; difference: {_interval_text(d)}") for c, d in differences
+    )
+    return Line(f"{entry.row.name} \N{MINUS SIGN} {other.row.name}", cells)
 
 
 def _headers(scores: Scores, columns: Sequence[str]) -> tuple[tuple[str, str], ...]:
@@ -261,7 +245,7 @@ def training_table(rows: Sequence[RowScores]) -> Table:
             Cell(f"{records[0].parameters:,}" if records[0].parameters else "none", records[0].parameters or 0),
             Cell(str(len(records)), len(records)),
             _time_cell("s", train, 0),
-            _time_cell("ms a window", [1000 * r.predict_seconds / entry.row.windows for r in records], 1),
+            _time_cell("ms a window", entry.row.window_ms, 1),
             Cell(", ".join(sorted({record.device for record in records}))),
         )
         bodies.append((Line(entry.row.name, cells),))
