@@ -33,7 +33,7 @@
 
   const legend = document.querySelector("#examples .legend");
   if (!legend) return;
-  const button = Object.assign(document.createElement("button"), { type: "button", className: "colours", textContent: "Class colours of the paper" });
+  const button = element("button", { type: "button", className: "colours" }, "Class colours of the paper");
   button.title = "The colours shown first can be told apart by colour-blind readers, too";
   button.setAttribute("aria-pressed", "false");
   button.onclick = () => {

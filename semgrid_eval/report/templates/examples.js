@@ -1,11 +1,5 @@
 "use strict";
 (() => {
-  const element = (kind, properties, ...children) => {
-    const made = Object.assign(document.createElement(kind), properties);
-    made.append(...children);
-    return made;
-  };
-
   // A step without photos of its own, like the prediction, shows those of the step before it: the target's.
   const photos = (steps, at, kind) => {
     for (let i = at; i >= 0; i--) {

@@ -1,4 +1,10 @@
 "use strict";
+const element = (kind, properties, ...children) => {
+  const made = Object.assign(document.createElement(kind), properties);
+  made.append(...children);
+  return made;
+};
+
 (() => {
   const value = (body, column) => {
     const cell = body.rows[0].cells[column];
@@ -43,12 +49,6 @@
     link.download = `${name}.csv`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-  };
-
-  const element = (kind, properties, ...children) => {
-    const made = Object.assign(document.createElement(kind), properties);
-    made.append(...children);
-    return made;
   };
 
   // What stands behind a number is its tooltip; a touch screen has none, so a tap shows it above the table.
