@@ -99,6 +99,12 @@ def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
     return said
 
 
+def widths(rows: Sequence[Row]) -> str:
+    """Say how wide the grids of rows are."""
+    specs = [row.shown.spec for row in rows]
+    return " or ".join(f"{width_m:g} m" for width_m in sorted({spec.columns * spec.cell_m for spec in specs}))
+
+
 def _title(contest: Contest) -> str:
     names = [contest.model.name, *(rival.name for rival in contest.rivals)]
     if contest.baselines:

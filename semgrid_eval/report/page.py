@@ -23,7 +23,7 @@ from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, Headline, headlin
 from semgrid_eval.report.estimates import Scores, score_rows
 from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, find, finding_table, missing_table, sentence
-from semgrid_eval.report.gallery import example_groups, gaps
+from semgrid_eval.report.gallery import example_groups, gaps, widths
 from semgrid_eval.report.paper import paper_table
 from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.reading import Row, Run, load_runs
@@ -137,6 +137,7 @@ def render_page(material: Material) -> str:
         right_legend=RIGHT_LEGEND,
         examples=examples,
         gaps=gaps(rows, examples),
+        widths=widths(rows),
         failures=provenance.failures(runs),
         logs=provenance.log_table(runs),
         results=provenance.result_table(runs),

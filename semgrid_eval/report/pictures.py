@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, NO_POINT, class_palette
+from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, NO_POINT, UNKNOWN, class_palette
 from semgrid_eval.frames.png import decode_ids
 from semgrid_eval.report.colours import class_colours, hex_colour
 
@@ -101,7 +101,7 @@ def certainty_png(certainty: Grid) -> bytes:
 def right_png(target: Grid, prediction: Grid, baseline: Grid, mask: NDArray[np.bool_]) -> bytes:
     """Draw who is right in each cell, in `RIGHT_COLOURS`: (H, W) each."""
     mine, theirs = prediction == target, baseline == target
-    shown = np.select([mask, mine & theirs & (target == 0), mine & theirs, mine, theirs], [5, 0, 1, 2, 3], 4)
+    shown = np.select([mask, mine & theirs & (target == UNKNOWN), mine & theirs, mine, theirs], [5, 0, 1, 2, 3], 4)
     return _png(shown.astype(np.uint8), np.array(RIGHT_COLOURS, np.uint8))
 
 

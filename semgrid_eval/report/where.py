@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, KNOWN_IDS, UNKNOWN
 from semgrid_eval.errors import SemgridError
-from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.grids.spec import GridSpec
 from semgrid_eval.report.reading import Row, WindowReader
 from semgrid_eval.scores.calibration import LEVELS, certainty_counts, expected_calibration_error, reliability
 from semgrid_eval.scores.iou import category_iou, class_iou
@@ -82,7 +82,7 @@ def locate_row(row: Row, read: WindowReader = read_windows) -> Where:
     inputs, target = np.asarray(shown["inputs"], np.uint8), np.asarray(shown["target"], np.uint8)
     mask = np.asarray(shown["mask"], np.bool_)
     prediction, certainty = (np.asarray(mine[name], np.uint8) for name in ("prediction", "certainty"))
-    spec = (result.grid or GridConfig()).spec
+    spec = result.spec
     if not (len(target), spec.rows, spec.columns) == target.shape == prediction.shape == certainty.shape == mask.shape:
         raise ValueError(f"shapes of windows {target.shape}, predictions {prediction.shape} or the grid differ")
     bands = bands_of(spec)

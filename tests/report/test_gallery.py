@@ -1,14 +1,16 @@
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from support.fake_run import FakeRow, make_fake_run
 
+from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.report import gallery as gallery_module
 from semgrid_eval.report.comparison import headline
 from semgrid_eval.report.estimates import score_rows
 from semgrid_eval.report.examples import Contest, choose
-from semgrid_eval.report.gallery import example_groups, gaps, groups_of
+from semgrid_eval.report.gallery import example_groups, gaps, groups_of, widths
 from semgrid_eval.report.glimpses import Glimpses
 from semgrid_eval.report.reading import load_runs
 from semgrid_eval.scores.results import read_windows
@@ -57,6 +59,15 @@ def test_what_a_run_cannot_show_is_said(tmp_path):
     for words in ("no example with a blind band", "no example of them in a row", "There are no camera images"):
         assert words in said
     assert gaps(loaded, []) == []
+
+
+def test_grids_are_as_wide_as_their_rows_tell(run):
+    row = load_runs([run])[0].rows[0]
+    grid = GridConfig(spec=GridSpec(cell_m=0.5, columns=100)).model_dump(mode="json")
+    record = row.shown.record.model_copy(update={"config": {"grid": grid}})
+    narrow = replace(row, results=(replace(row.shown, record=record),))
+    assert widths([row, row]) == "100 m"
+    assert widths([row, narrow]) == "50 m or 100 m"
 
 
 def test_several_horizons_of_baselines_alone_are_no_example(tmp_path):
