@@ -16,6 +16,7 @@ from semgrid_eval.report.estimates import CATEGORY_COLUMNS, COLUMNS, DRAWS, LABE
 from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, finding_frame, finding_records
 from semgrid_eval.report.longform import category_table, class_table
+from semgrid_eval.report.pace import pace_frame
 from semgrid_eval.report.plots import training_frame
 from semgrid_eval.report.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
 from semgrid_eval.report.reading import Result, Row, Run
@@ -47,6 +48,7 @@ def write_tables(
     runs: Sequence[Run],
     scores: Scores,
     regions: Mapping[str, Scores],
+    paces: Mapping[str, Scores],
     findings: Sequence[Finding],
 ) -> None:
     """Write every table of the report as CSV, summary.md, summary.tex, each run's matrix and report.json."""
@@ -55,6 +57,7 @@ def write_tables(
     _write_csv(folder / "categories.csv", category_table(entries))
     _write_csv(folder / "summary.csv", summary_table(scores))
     _write_csv(folder / "regions.csv", region_frame(regions))
+    _write_csv(folder / "paces.csv", pace_frame(paces))
     _write_csv(folder / "findings.csv", finding_frame(findings))
     _write_csv(folder / "architecture.csv", architecture_frame(scores))
     _write_csv(folder / "training.csv", training_frame([row for run in runs for row in run.rows]))
@@ -63,7 +66,7 @@ def write_tables(
         write_text(folder / matrix_file(run, runs), matrix_text(run))
     write_text(folder / "summary.md", markdown_table(scores))
     write_text(folder / "summary.tex", latex_table(scores))
-    write_json(folder / RECORD, report_record(runs, scores, regions, findings))
+    write_json(folder / RECORD, report_record(runs, scores, regions, paces, findings))
 
 
 def write_located(folder: Path, located: Sequence[Where]) -> None:
@@ -118,7 +121,11 @@ def latex_table(scores: Scores) -> str:
 
 
 def report_record(
-    runs: Sequence[Run], scores: Scores, regions: Mapping[str, Scores], findings: Sequence[Finding]
+    runs: Sequence[Run],
+    scores: Scores,
+    regions: Mapping[str, Scores],
+    paces: Mapping[str, Scores],
+    findings: Sequence[Finding],
 ) -> dict[str, Any]:
     """Return everything a machine may want to know of a report; absent values are null."""
     scored = _row_records(scores)
@@ -138,6 +145,7 @@ def report_record(
         "failures": [vars(failure) for failure in failures(runs)],
         "rows": {row.name: _row_facts(row) | scored.get(row.name, _UNSCORED) for run in runs for row in run.rows},
         "regions": {name: _row_records(near) for name, near in regions.items()},
+        "paces": {name: _row_records(alone) for name, alone in paces.items()},
         "findings": finding_records(findings),
     }
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 from semgrid_eval.errors import ResultError
 from semgrid_eval.report.commands import play_command
 from semgrid_eval.report.reading import Result, Row, Run
-from semgrid_eval.scores.pictures import LogPictures, pictures_file, read_pictures
+from semgrid_eval.scores.pictures import Drive, LogPictures, pictures_file, read_drive, read_pictures
 from semgrid_eval.scores.results import WindowRecord, scored_digest
 
 _EPOCH_FROM_NS = 10**17  # stamps beyond 1973 are dates, smaller ones are times since the start of a log
@@ -19,15 +19,35 @@ class Glimpses:
     def __init__(self, run: Run) -> None:
         self._run = run
         self._read = lru_cache(_LOGS_KEPT)(self._read_log)
+        self._drives: dict[tuple[str, str | None], Drive | None] = {}
 
     def of(self, log: str, result: Result) -> LogPictures | None:
         """Return what was kept of a log that a result is scored on, None where that is nothing that can be read."""
-        digest = scored_digest(self._run.record, result.record, log)
-        return None if digest is None else self._read(digest, None if result.grid is None else result.grid.camera)
+        key = self._key(log, result)
+        return None if key is None else self._read(*key)
+
+    def drive(self, log: str, result: Result) -> Drive | None:
+        """Return the drive of such a log alone; all that are asked for stay in memory."""
+        key = self._key(log, result)
+        if key is None:
+            return None
+        if key not in self._drives:
+            self._drives[key] = self._read_drive(*key)
+        return self._drives[key]
 
     def command(self, row: Row, window: WindowRecord) -> str:
         """Write the command that plays a window's recording."""
         return play_command(self._run.record.command, row.record.name, window.recording)
+
+    def _key(self, log: str, result: Result) -> tuple[str, str | None] | None:
+        digest = scored_digest(self._run.record, result.record, log)
+        return None if digest is None else (digest, None if result.grid is None else result.grid.camera)
+
+    def _read_drive(self, digest: str, camera: str | None) -> Drive | None:
+        try:
+            return read_drive(pictures_file(self._run.folder, digest, camera))
+        except ResultError:
+            return None
 
     def _read_log(self, digest: str, camera: str | None) -> LogPictures | None:
         try:

@@ -24,6 +24,7 @@ from semgrid_eval.report.estimates import Scores, score_rows
 from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, find, finding_table, missing_table, sentence
 from semgrid_eval.report.gallery import example_groups, gaps, widths
+from semgrid_eval.report.pace import PACE_EDGES_MPS, pace_tables, score_paces
 from semgrid_eval.report.paper import paper_table
 from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.reading import Row, Run, load_runs
@@ -43,6 +44,7 @@ class Material:
         runs: the runs as read from disk.
         scores: scores of all rows that have some.
         regions: the same of cells near moving and near standing actors alone.
+        paces: the same of windows by how fast the vehicle drives in them.
         findings: what the runs say about the paper's claims.
         located: where rows are right.
         problems: of which rows that cannot be said, and why.
@@ -52,6 +54,7 @@ class Material:
     runs: Sequence[Run]
     scores: Scores
     regions: Mapping[str, Scores]
+    paces: Mapping[str, Scores]
     findings: Sequence[Finding]
     located: Sequence[Where]
     problems: Sequence[str]
@@ -76,7 +79,9 @@ def write_report(run: Path | Sequence[Path], out: Path | None = None, *, progres
     _check_replaceable(out)
     material = gather(load_runs(folders, progress=progress))
     with atomic_folder(out) as folder:
-        exports.write_tables(folder, material.runs, material.scores, material.regions, material.findings)
+        exports.write_tables(
+            folder, material.runs, material.scores, material.regions, material.paces, material.findings
+        )
         exports.write_located(folder, material.located)
         exports.write_figures(folder, material.figures)
         (folder / PAGE).write_text(render_page(material), encoding="utf-8")
@@ -88,9 +93,10 @@ def gather(runs: Sequence[Run]) -> Material:
     rows = [row for each in runs for row in each.rows]
     scores = score_rows(rows, np.random.default_rng(_SEED))
     regions = score_regions(rows, _SEED)
+    paces = score_paces(runs, [entry.row for entry in scores.values()], _SEED)
     located, problems = locate_rows(entry.row for entry in scores.values())
     figures = draw_figures(scores, rows, located)
-    return Material(runs, scores, regions, find(runs, scores, regions), located, problems, figures)
+    return Material(runs, scores, regions, paces, find(runs, scores, regions), located, problems, figures)
 
 
 def draw_figures(scores: Scores, rows: Sequence[Row], located: Sequence[Where]) -> dict[str, list[Plot]]:
@@ -126,7 +132,10 @@ def render_page(material: Material) -> str:
         runs=runs,
         title=", ".join(each.record.title for each in runs),
         summary=summarise(runs, scores, found),
-        tables=page_tables(runs, scores) | tables.where_tables(material.located) | region_tables(material.regions),
+        tables=page_tables(runs, scores)
+        | tables.where_tables(material.located)
+        | region_tables(material.regions)
+        | pace_tables(material.paces),
         about_settings=sum(e.row.record.name not in paper_table() for e in scores.values()) > len(scores) / 2,
         findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
         margin=MARGIN,
@@ -138,6 +147,7 @@ def render_page(material: Material) -> str:
         examples=examples,
         gaps=gaps(rows, examples),
         widths=widths(rows),
+        stands_mps=PACE_EDGES_MPS[0],
         failures=provenance.failures(runs),
         logs=provenance.log_table(runs),
         results=provenance.result_table(runs),

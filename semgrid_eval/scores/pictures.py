@@ -106,6 +106,15 @@ def read_pictures(path: Path) -> LogPictures:
     return LogPictures(_drive(arrays, path), frames)
 
 
+def read_drive(path: Path) -> Drive:
+    """Read the drive alone of what is kept of a log.
+
+    Raises:
+        ResultError: it is missing or malformed.
+    """
+    return _drive(read_arrays(path, _DRIVE), path)
+
+
 def _drive(arrays: Mapping[str, NDArray[Any]], path: Path) -> Drive:
     start_ns = int(_checked(arrays, "start_ns", (1,), np.int64, path)[0])
     track_ns = _checked(arrays, "track_ns", (-1,), np.int64, path)

@@ -12,6 +12,7 @@ from semgrid_eval.scores.pictures import (
     FramePictures,
     LogPictures,
     pictures_file,
+    read_drive,
     read_pictures,
     write_pictures,
 )
@@ -68,6 +69,16 @@ def test_files_that_contradict_themselves_are_refused(tmp_path, name, value, mes
     write_arrays(tmp_path / "kept", {**arrays, name: value})
     with pytest.raises(ResultError, match=re.escape(message)):
         read_pictures(tmp_path / "kept")
+
+
+def test_the_drive_can_be_read_alone(tmp_path):
+    write_pictures(tmp_path / "kept", PICTURES)
+    alone = read_drive(tmp_path / "kept")
+    assert alone.start_ns == PICTURES.drive.start_ns
+    for name in ("track_ns", "track", "projection"):
+        np.testing.assert_array_equal(getattr(alone, name), getattr(PICTURES.drive, name))
+    with pytest.raises(ResultError, match="cannot be read"):
+        read_drive(tmp_path / "none")
 
 
 def test_a_missing_or_damaged_file_is_told(tmp_path):
