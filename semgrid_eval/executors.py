@@ -110,7 +110,12 @@ class Processes:
             initargs=(self._threads, self._gpus, _CONTEXT.Value("i", 0), begun),
         )
         try:
-            futures: dict[Future[R], int] = {pool.submit(_begin, function, items[i], i): i for i in chosen}
+            futures: dict[Future[R], int] = {}
+            for index in chosen:
+                try:
+                    futures[pool.submit(_begin, function, items[index], index)] = index
+                except BrokenProcessPool:
+                    yield index, WorkerDied()
             for future in as_completed(futures):
                 try:
                     yield futures[future], future.result()

@@ -67,7 +67,7 @@ def test_model_of_the_readme_predicts_the_newest_grid(tmp_path):
     assert torch.equal(answer.argmax(dim=1), past[:, 0, -1].long())
 
 
-@pytest.mark.parametrize("page", ["README.md", "ARCHITECTURE.md", "docs/town.md"])
+@pytest.mark.parametrize("page", ["README.md", "ARCHITECTURE.md", "docs/town.md", "reports/README.md"])
 def test_links_and_files_that_a_page_names_exist(page):
     text = (ROOT / page).read_text(encoding="utf-8")
     links = [target for target in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in target]

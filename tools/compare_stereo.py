@@ -93,8 +93,10 @@ def _measure_pixels(logs: list[Path], count: int) -> Tally:
             camera = reader.scene.cameras[0]
             calibration = reader.calibration(camera)
             depth_disparity = calibration.fx_px * calibration.baseline_m
-            for frame in _spread(list(reader.frames(camera)), count):
-                _add_pixels(tally, frame, depth_disparity)
+            chosen = set(_spread(range(sum(1 for _ in reader.frames(camera))), count))
+            for index, frame in enumerate(reader.frames(camera)):
+                if index in chosen:
+                    _add_pixels(tally, frame, depth_disparity)
     return tally
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from semgrid_eval.config import parse_config
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.frames.synthetic.drives import FRAME_COUNT, FRAME_RATE_HZ, ego_path
 from semgrid_eval.frames.synthetic.recordings import RecordingPlan, SyntheticConfig, plan_recordings
@@ -27,10 +28,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     try:
-        plans = plan_recordings(SyntheticConfig(recordings=options.windows, seed=options.seed), options.cache, silent)
+        config = parse_config(SyntheticConfig, {"recordings": options.windows, "seed": options.seed})
+        plans = plan_recordings(config, options.cache, silent)
+        speeds_mps, turns_deg = np.array([_drive(plan) for plan in plans]).T
     except SemgridError as error:
         raise SystemExit(f"Error: {error}") from None
-    speeds_mps, turns_deg = np.array([_drive(plan) for plan in plans]).T
     moving_mps = speeds_mps[speeds_mps >= SLOW_MPS]
     print(f"{len(plans)} windows of {len({plan.town for plan in plans})} towns")
     print(f"below {SLOW_MPS:g} m/s: {np.mean(speeds_mps < SLOW_MPS):.2f}")

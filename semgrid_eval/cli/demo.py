@@ -7,6 +7,7 @@ import click
 
 from semgrid_eval.cli.console import command_line, progress, say
 from semgrid_eval.cli.work import device_option, workers_option
+from semgrid_eval.config import parse_config
 from semgrid_eval.executors import local_executor
 
 PRESET = "demo"
@@ -35,7 +36,7 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
 
     start_s = time.monotonic()
     logs, run = out / "logs", out / "run"
-    config = SyntheticConfig(recordings=recordings, seed=seed, towns=TOWNS)
+    config = parse_config(SyntheticConfig, {"recordings": recordings, "seed": seed, "towns": TOWNS})
     code = show(convert_town(config, logs, workers=workers, stage=progress), logs)
     options = RunOptions(device, out / "grids", command_line(), grid_executor=local_executor(workers))
     record = run_matrix(load_matrix(PRESET), logs, run, options, stage=progress)

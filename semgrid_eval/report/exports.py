@@ -17,6 +17,7 @@ from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, finding_frame, finding_records
 from semgrid_eval.report.longform import category_table, class_table
 from semgrid_eval.report.pace import pace_frame
+from semgrid_eval.report.parts import Parts
 from semgrid_eval.report.plots import training_frame
 from semgrid_eval.report.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
 from semgrid_eval.report.reading import Result, Row, Run
@@ -47,17 +48,19 @@ def write_tables(
     folder: Path,
     runs: Sequence[Run],
     scores: Scores,
-    regions: Mapping[str, Scores],
-    paces: Mapping[str, Scores],
+    parts: Mapping[str, Parts],
     findings: Sequence[Finding],
 ) -> None:
-    """Write every table of the report as CSV, summary.md, summary.tex, each run's matrix and report.json."""
+    """Write every table of the report as CSV, summary.md, summary.tex, each run's matrix and report.json.
+
+    `parts` are the scores of `regions` and of `paces`.
+    """
     entries = list(scores.values())
     _write_csv(folder / "classes.csv", class_table(entries))
     _write_csv(folder / "categories.csv", category_table(entries))
     _write_csv(folder / "summary.csv", summary_table(scores))
-    _write_csv(folder / "regions.csv", region_frame(regions))
-    _write_csv(folder / "paces.csv", pace_frame(paces))
+    _write_csv(folder / "regions.csv", region_frame(parts["regions"]))
+    _write_csv(folder / "paces.csv", pace_frame(parts["paces"]))
     _write_csv(folder / "findings.csv", finding_frame(findings))
     _write_csv(folder / "architecture.csv", architecture_frame(scores))
     _write_csv(folder / "training.csv", training_frame([row for run in runs for row in run.rows]))
@@ -66,7 +69,7 @@ def write_tables(
         write_text(folder / matrix_file(run, runs), matrix_text(run))
     write_text(folder / "summary.md", markdown_table(scores))
     write_text(folder / "summary.tex", latex_table(scores))
-    write_json(folder / RECORD, report_record(runs, scores, regions, paces, findings))
+    write_json(folder / RECORD, report_record(runs, scores, parts, findings))
 
 
 def write_located(folder: Path, located: Sequence[Where]) -> None:
@@ -121,11 +124,7 @@ def latex_table(scores: Scores) -> str:
 
 
 def report_record(
-    runs: Sequence[Run],
-    scores: Scores,
-    regions: Mapping[str, Scores],
-    paces: Mapping[str, Scores],
-    findings: Sequence[Finding],
+    runs: Sequence[Run], scores: Scores, parts: Mapping[str, Parts], findings: Sequence[Finding]
 ) -> dict[str, Any]:
     """Return everything a machine may want to know of a report; absent values are null."""
     scored = _row_records(scores)
@@ -144,8 +143,7 @@ def report_record(
         ],
         "failures": [vars(failure) for failure in failures(runs)],
         "rows": {row.name: _row_facts(row) | scored.get(row.name, _UNSCORED) for run in runs for row in run.rows},
-        "regions": {name: _row_records(near) for name, near in regions.items()},
-        "paces": {name: _row_records(alone) for name, alone in paces.items()},
+        **{kind: {name: _row_records(alone) for name, alone in found.items()} for kind, found in parts.items()},
         "findings": finding_records(findings),
     }
 

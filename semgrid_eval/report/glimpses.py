@@ -2,6 +2,7 @@
 
 from datetime import UTC, datetime
 from functools import lru_cache
+from pathlib import Path
 
 from semgrid_eval.errors import ResultError
 from semgrid_eval.report.commands import play_command
@@ -19,6 +20,7 @@ class Glimpses:
     def __init__(self, run: Run) -> None:
         self._run = run
         self._read = lru_cache(_LOGS_KEPT)(self._read_log)
+        self._digests: dict[tuple[str, Path], str | None] = {}
         self._drives: dict[tuple[str, str | None], Drive | None] = {}
 
     def of(self, log: str, result: Result) -> LogPictures | None:
@@ -40,7 +42,10 @@ class Glimpses:
         return play_command(self._run.record.command, row.record.name, window.recording)
 
     def _key(self, log: str, result: Result) -> tuple[str, str | None] | None:
-        digest = scored_digest(self._run.record, result.record, log)
+        asked = (log, result.folder)
+        if asked not in self._digests:
+            self._digests[asked] = scored_digest(self._run.record, result.record, log)
+        digest = self._digests[asked]
         return None if digest is None else (digest, None if result.grid is None else result.grid.camera)
 
     def _read_drive(self, digest: str, camera: str | None) -> Drive | None:

@@ -30,12 +30,11 @@ def score_paces(runs: Sequence[Run], rows: Sequence[Row], seed: int) -> dict[str
     A pace is one of `PACES`: speeds between `PACE_EDGES_MPS`, below the first of which a vehicle stands.
     """
     kept = {run.folder: Glimpses(run) for run in runs}
-    shared: dict[tuple[Path, str], NDArray[np.int64]] = {}
+    shared: dict[_Key, NDArray[np.int64]] = {}
     for row in rows:
         for result in row.results:
-            windows = (row.run, result.record.windows_id)
-            if windows not in shared:
-                shared[windows] = _paces(result, kept[row.run])
+            if _key(row, result) not in shared:
+                shared[_key(row, result)] = _paces(result, kept[row.run])
     found: dict[str, Scores] = {}
     for number, name in enumerate(PACES):
         alone = [_of_pace(row, shared, number) for row in rows]
@@ -43,6 +42,12 @@ def score_paces(runs: Sequence[Run], rows: Sequence[Row], seed: int) -> dict[str
         if scores:
             found[name] = scores
     return found
+
+
+def rows_without_pace(rows: Sequence[Row], paces: Mapping[str, Scores]) -> list[str]:
+    """Name the rows of whose windows nobody knows how the vehicle drove."""
+    known = {name for scores in paces.values() for name in scores}
+    return [row.name for row in rows if row.name not in known]
 
 
 def pace_tables(paces: Mapping[str, Scores]) -> dict[str, Table | None]:
@@ -76,9 +81,17 @@ def _paces(result: Result, kept: Glimpses) -> NDArray[np.int64]:
     return found
 
 
-def _of_pace(row: Row, paces: Mapping[tuple[Path, str], NDArray[np.int64]], number: int) -> Row:
+_Key = tuple[Path, str, bool]
+
+
+def _key(row: Row, result: Result) -> _Key:
+    """Tell windows apart: those of one id are the same, but results of older versions lack the times of inputs."""
+    return row.run, result.record.windows_id, any(window.input_stamps_ns for window in result.record.windows)
+
+
+def _of_pace(row: Row, paces: Mapping[_Key, NDArray[np.int64]], number: int) -> Row:
     """Take a row's windows of one pace alone; results without any are left out."""
-    chosen = (_chosen(each, paces[row.run, each.record.windows_id] == number) for each in row.results)
+    chosen = (_chosen(each, paces[_key(row, each)] == number) for each in row.results)
     return replace(row, results=tuple(result for result in chosen if len(result.counts)))
 
 

@@ -24,7 +24,7 @@ from semgrid_eval.report.estimates import Scores, score_rows
 from semgrid_eval.report.figure import Plot
 from semgrid_eval.report.findings import Finding, find, finding_table, missing_table, sentence
 from semgrid_eval.report.gallery import example_groups, gaps, widths
-from semgrid_eval.report.pace import PACE_EDGES_MPS, pace_tables, score_paces
+from semgrid_eval.report.pace import PACE_EDGES_MPS, pace_tables, rows_without_pace, score_paces
 from semgrid_eval.report.paper import paper_table
 from semgrid_eval.report.pictures import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.reading import Row, Run, load_runs
@@ -79,9 +79,8 @@ def write_report(run: Path | Sequence[Path], out: Path | None = None, *, progres
     _check_replaceable(out)
     material = gather(load_runs(folders, progress=progress))
     with atomic_folder(out) as folder:
-        exports.write_tables(
-            folder, material.runs, material.scores, material.regions, material.paces, material.findings
-        )
+        parts = {"regions": material.regions, "paces": material.paces}
+        exports.write_tables(folder, material.runs, material.scores, parts, material.findings)
         exports.write_located(folder, material.located)
         exports.write_figures(folder, material.figures)
         (folder / PAGE).write_text(render_page(material), encoding="utf-8")
@@ -148,6 +147,7 @@ def render_page(material: Material) -> str:
         gaps=gaps(rows, examples),
         widths=widths(rows),
         stands_mps=PACE_EDGES_MPS[0],
+        unpaced=rows_without_pace(rows, material.paces),
         failures=provenance.failures(runs),
         logs=provenance.log_table(runs),
         results=provenance.result_table(runs),

@@ -1,12 +1,14 @@
 """Scores by speed: every window belongs to the pace that the vehicle really drove."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.fake_run import FRAME_NS, FakeRow, make_fake_run
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.report.estimates import score_rows
-from semgrid_eval.report.pace import PACES, mean_speed_mps, pace_frame, pace_tables, score_paces
+from semgrid_eval.report.pace import PACES, mean_speed_mps, pace_frame, pace_tables, rows_without_pace, score_paces
 from semgrid_eval.report.page import write_report
 from semgrid_eval.report.reading import load_runs
 from semgrid_eval.scores.iou import class_iou
@@ -83,7 +85,7 @@ def test_a_run_that_knows_no_drive_says_so(tmp_path, drives):
     assert scored(runs) == {}
     assert set(pace_tables({}).values()) == {None}
     page = write_report(tmp_path / "run")
-    assert "Nothing is known of how the vehicles drove" in page.read_text()
+    assert "No result here tells how its vehicle drove" in page.read_text()
     assert (page.parent / "paces.csv").read_text().count("\n") == 1
 
 
@@ -93,8 +95,20 @@ def test_a_log_whose_drive_is_unknown_is_left_out(tmp_path):
     assert paces["4 to 8 m/s"]["BL-DC"].row.windows == 2
 
 
+def test_results_of_older_versions_do_not_hide_newer_ones(runs):
+    (run,) = runs
+    older = run.rows[0].results[0]
+    untimed = tuple(window.model_copy(update={"input_stamps_ns": ()}) for window in older.record.windows)
+    record = older.record.model_copy(
+        update={"windows": untimed, "windows_id": run.rows[1].results[0].record.windows_id}
+    )
+    rows = [replace(run.rows[0], results=(replace(older, record=record),)), run.rows[1]]
+    paces = score_paces(runs, rows, 0)
+    assert [list(scores) for scores in paces.values()] == [["ED-DC"]] * len(PACES)
+    assert rows_without_pace(rows, paces) == ["BL-DC"]
+
+
 def test_a_run_with_pictures_shows_its_paces(seen_page):
     text = seen_page.read_text()
-    assert "By the vehicle" in text
-    assert "IoU by the vehicle" in text
-    assert "Nothing is known of how the vehicles drove" not in text
+    assert 'id="table-paces"' in text
+    assert "No result here tells how its vehicle drove" not in text

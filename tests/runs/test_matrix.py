@@ -187,6 +187,15 @@ def test_cpu_presets_share_the_training_of_paper_cpu():
     assert rows["sensitivity ED-default"].model_dump(exclude={"name"}) == shared
 
 
+def test_longer_training_differs_from_paper_cpu_in_features_and_updates_alone():
+    shared = next(row for row in load_matrix("paper-cpu").rows if row.name == "ED-DC")
+    for row in load_matrix("updates-cpu").rows:
+        if row.trained:
+            training = row.training.model_copy(update={"updates_per_epoch": shared.training.updates_per_epoch})
+            assert training == shared.training
+            assert row.network == shared.network.model_copy(update={"features": 16})
+
+
 def test_a_validation_window_is_as_the_window_where_it_says_nothing(tmp_path):
     row = {
         "name": "n{window.inputs}",
