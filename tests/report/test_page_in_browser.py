@@ -112,6 +112,17 @@ def test_a_printed_page_holds_every_table(browser, page):
     assert tools == "none"
 
 
+def test_how_trainings_were_scaled_is_read_whole_on_a_phone(browser, page):
+    _open(browser, page, width=390)
+    script = """
+    const line = document.querySelector('#summary .hint.name');
+    line.textContent = 'updates an epoch 150 instead of 185, '.repeat(9);
+    return [line.scrollHeight, line.clientHeight];
+    """
+    whole, shown = browser.execute_script(script)
+    assert whole <= shown
+
+
 def test_a_wide_figure_is_reached_by_keyboard_on_a_phone(browser, page):
     _open(browser, page, width=390)
     script = """
