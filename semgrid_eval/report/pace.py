@@ -91,10 +91,5 @@ def _key(row: Row, result: Result) -> _Key:
 
 def _of_pace(row: Row, paces: Mapping[_Key, NDArray[np.int64]], number: int) -> Row:
     """Take a row's windows of one pace alone; results without any are left out."""
-    chosen = (_chosen(each, paces[_key(row, each)] == number) for each in row.results)
+    chosen = (each.of_windows(paces[_key(row, each)] == number, each.counts) for each in row.results)
     return replace(row, results=tuple(result for result in chosen if len(result.counts)))
-
-
-def _chosen(result: Result, used: NDArray[np.bool_]) -> Result:
-    windows = tuple(window for window, kept in zip(result.record.windows, used, strict=True) if kept)
-    return replace(result, counts=result.counts[used], record=result.record.model_copy(update={"windows": windows}))

@@ -1,7 +1,7 @@
 """Reads a run's result files; what cannot be read becomes a failure of its row, and the rest goes on."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -52,6 +52,11 @@ class Result:
             return parse_config(GridConfig, self.record.config["grid"])
         except (KeyError, ConfigError):
             return None
+
+    def of_windows(self, used: NDArray[np.bool_], counts: NDArray[np.int32]) -> "Result":
+        """Give the result of the windows marked in `used` (N,) alone, with their part of other counts (N, C, C)."""
+        windows = tuple(window for window, kept in zip(self.record.windows, used, strict=True) if kept)
+        return replace(self, counts=counts[used], record=self.record.model_copy(update={"windows": windows}))
 
     @property
     def spec(self) -> GridSpec:

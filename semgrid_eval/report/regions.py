@@ -53,6 +53,4 @@ def _row_near(row: Row, region: str) -> Row:
 def _near(result: Result, region: str) -> Result:
     """Keep the windows that have such actors, so that the number of windows is that of the evidence."""
     counts = result.regions[region]
-    used = np.asarray(counts.sum(axis=(1, 2)) > 0)
-    windows = tuple(window for window, kept in zip(result.record.windows, used, strict=True) if kept)
-    return replace(result, counts=counts[used], record=result.record.model_copy(update={"windows": windows}))
+    return result.of_windows(np.asarray(counts.sum(axis=(1, 2)) > 0), counts)
