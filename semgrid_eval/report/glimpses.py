@@ -1,8 +1,10 @@
 """What a run kept of the logs behind its windows: pictures, the drive, and how to find a window again."""
 
+from collections.abc import Callable
 from datetime import UTC, datetime
-from functools import lru_cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
+from typing import TypeVar
 
 from semgrid_eval.errors import ResultError
 from semgrid_eval.report.commands import play_command
@@ -12,6 +14,7 @@ from semgrid_eval.scores.results import WindowRecord, scored_digest
 
 _EPOCH_FROM_NS = 10**17  # stamps beyond 1973 are dates, smaller ones are times since the start of a log
 _LOGS_KEPT = 64  # in memory
+T = TypeVar("T")
 
 
 class Glimpses:
@@ -19,9 +22,9 @@ class Glimpses:
 
     def __init__(self, run: Run) -> None:
         self._run = run
-        self._read = lru_cache(_LOGS_KEPT)(self._read_log)
+        self._read = lru_cache(_LOGS_KEPT)(partial(self._kept, read_pictures))
+        self._read_drive = cache(partial(self._kept, read_drive))
         self._digests: dict[tuple[str, Path], str | None] = {}
-        self._drives: dict[tuple[str, str | None], Drive | None] = {}
 
     def of(self, log: str, result: Result) -> LogPictures | None:
         """Return what was kept of a log that a result is scored on, None where that is nothing that can be read."""
@@ -31,11 +34,7 @@ class Glimpses:
     def drive(self, log: str, result: Result) -> Drive | None:
         """Return the drive of such a log alone; all that are asked for stay in memory."""
         key = self._key(log, result)
-        if key is None:
-            return None
-        if key not in self._drives:
-            self._drives[key] = self._read_drive(*key)
-        return self._drives[key]
+        return None if key is None else self._read_drive(*key)
 
     def command(self, row: Row, window: WindowRecord) -> str:
         """Write the command that plays a window's recording."""
@@ -48,15 +47,9 @@ class Glimpses:
         digest = self._digests[asked]
         return None if digest is None else (digest, None if result.grid is None else result.grid.camera)
 
-    def _read_drive(self, digest: str, camera: str | None) -> Drive | None:
+    def _kept(self, read: Callable[[Path], T], digest: str, camera: str | None) -> T | None:
         try:
-            return read_drive(pictures_file(self._run.folder, digest, camera))
-        except ResultError:
-            return None
-
-    def _read_log(self, digest: str, camera: str | None) -> LogPictures | None:
-        try:
-            return read_pictures(pictures_file(self._run.folder, digest, camera))
+            return read(pictures_file(self._run.folder, digest, camera))
         except ResultError:
             return None
 
