@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from functools import cache
 
 import cv2
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +16,7 @@ from semgrid_eval.frames.synthetic.solids import Soup, Texture
 
 _TILE_PX = 512
 _AMBIENT, _SUN = 0.52, 0.62
+_FACADE, _PLANKS = int(Texture.FACADE), int(Texture.PLANKS)
 _SHADOW_STEP = 2  # shadows are cast for every second pixel of every second row
 _SHADOW_REACH_M = 100.0
 _WINDOW_M, _FLOOR_M = 2.3, 3.1
@@ -108,69 +110,73 @@ class Painter:
         materials = _Materials.joined([self._still, _Materials.of_soup(movers, sun.direction), self._ground])
         first_ground = len(materials.facing) - len(self._ground.facing)
         material = np.where(view.triangle == NO_TRIANGLE, view.surface + np.int32(first_ground), view.triangle)
-        normal = np.take(materials.normal, material, axis=0)
-        light = materials.facing[material] * self._lit(view, casters, normal) * np.float32(_SUN * (1.0 - sun.overcast))
-        light += np.float32(_AMBIENT + 0.45 * sun.overcast)
-        light *= _texture(view, materials, material, normal)
-        painted = np.take(materials.colour, material, axis=0)
-        painted *= light[:, None]
-        painted -= _HAZE_COLOUR
-        painted *= np.exp(np.minimum(view.depth_m, 1e3) * np.float32(-1.0 / _HAZE_M))[:, None]
-        painted += _HAZE_COLOUR
-        is_sky = np.flatnonzero(np.isinf(view.depth_m))
-        painted[is_sky] = self._sky[is_sky]
-        rgb = cv2.convertScaleAbs(np.maximum(painted, 0.0, out=painted))
-        return np.asarray(cv2.cvtColor(rgb.reshape(*self._shape, 3), cv2.COLOR_RGB2BGR))
+        lit = self._lit(view, casters, materials.normal, material)
+        light = (np.float32(_SUN * (1.0 - sun.overcast)), np.float32(_AMBIENT + 0.45 * sun.overcast))
+        # Not in the loop below, whose exponential would round other than NumPy's.
+        clarity = np.exp(np.minimum(view.depth_m, 1e3) * np.float32(-1.0 / _HAZE_M))
+        tables = tuple(getattr(materials, field.name) for field in fields(_Materials))
+        image = self._sky.copy()
+        _paint(image, view.points_m, material, tables, _noise_tile(), light, lit, clarity, np.isinf(view.depth_m))
+        return image.reshape(*self._shape, 3)
 
-    def _lit(self, view: View, casters: Sequence[RayCaster], normal: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _lit(
+        self, view: View, casters: Sequence[RayCaster], normal: NDArray[np.float32], material: NDArray[np.int32]
+    ) -> NDArray[np.float32]:
         """Return 1 where the sun reaches a pixel's point and 0 in shadow (N,), softened by the coarser sampling."""
         height, width = self._shape
         pixels = np.arange(height * width).reshape(height, width)[::_SHADOW_STEP, ::_SHADOW_STEP]
         seen = pixels[np.isfinite(view.depth_m[pixels])]
         rays = np.tile(self._sunlight.direction, (len(seen), 1))
         reach_m = np.full(len(seen), _SHADOW_REACH_M, np.float32)
-        _, hit = cast_at_all(casters, view.points_m[seen] + np.float32(0.03) * normal[seen], rays, reach_m)
+        _, hit = cast_at_all(casters, view.points_m[seen] + np.float32(0.03) * normal[material[seen]], rays, reach_m)
         lit = np.ones(height * width, np.float32)
         lit[seen] = hit == NO_TRIANGLE
         return np.asarray(cv2.resize(lit[pixels], (width, height), interpolation=cv2.INTER_LINEAR).reshape(-1))
 
 
-def _texture(
-    view: View, materials: _Materials, material: NDArray[np.int32], normal: NDArray[np.float32]
-) -> NDArray[np.float32]:
-    """Return the brightness (N,) of each pixel's surface: noise fixed to the world, windows, planks."""
-    x_m, y_m, z_m = np.ascontiguousarray(view.points_m.T)
-    is_wall = materials.is_wall[material]
-    along_m = np.where(is_wall, y_m * normal[:, 0] - x_m * normal[:, 1], x_m)
-    across_m = np.where(is_wall, z_m, y_m)
-    brightness = _noise(along_m, across_m, 24.0) + np.float32(0.7) * _noise(along_m, across_m, 3.0)
-    brightness *= materials.contrast[material]
-    brightness += np.float32(1.0)
-    texture = materials.texture[material]
-    facade = np.flatnonzero(is_wall & (texture == Texture.FACADE))
-    brightness[facade[_is_window(along_m[facade], z_m[facade])]] *= np.float32(0.42)
-    planks = np.flatnonzero(texture == Texture.PLANKS)
-    brightness[planks[(along_m[planks] * 6.0).astype(np.int32) % 2 == 0]] *= np.float32(0.75)
-    return brightness
+@numba.njit(cache=True, nogil=True)
+def _paint(image, points_m, material, tables, tile, light, lit, clarity, is_sky):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Write the colours (N, 3) of all pixels but the sky's, blue first; single precision throughout."""
+    normal, facing, is_wall, colour, texture, contrast = tables
+    sunshine, daylight = light
+    for pixel in range(len(material)):
+        if is_sky[pixel]:
+            continue
+        m = material[pixel]
+        x_m, y_m, z_m = points_m[pixel, 0], points_m[pixel, 1], points_m[pixel, 2]
+        along_m, across_m = x_m, y_m
+        if is_wall[m]:
+            along_m, across_m = y_m * normal[m, 0] - x_m * normal[m, 1], z_m
+        noise = _noise(tile, along_m, across_m, np.float32(24.0))
+        noise += np.float32(0.7) * _noise(tile, along_m, across_m, np.float32(3.0))
+        brightness = noise * contrast[m] + np.float32(1.0)
+        if texture[m] == _FACADE and is_wall[m] and _is_window(along_m, z_m):
+            brightness *= np.float32(0.42)
+        elif texture[m] == _PLANKS and np.int32(along_m * np.float32(6.0)) % 2 == 0:
+            brightness *= np.float32(0.75)
+        brightness *= facing[m] * lit[pixel] * sunshine + daylight
+        for channel in range(3):
+            haze = _HAZE_COLOUR[channel]
+            value = (colour[m, channel] * brightness - haze) * clarity[pixel] + haze
+            image[pixel, 2 - channel] = np.uint8(np.rint(min(max(value, np.float32(0.0)), np.float32(255.0))))
 
 
-def _is_window(along_m: NDArray[np.float32], z_m: NDArray[np.float32]) -> NDArray[np.bool_]:
-    column = np.mod(along_m * np.float32(1.0 / _WINDOW_M), 1.0)
-    row = np.mod(z_m * np.float32(1.0 / _FLOOR_M), 1.0)
-    return np.asarray((np.abs(column - 0.5) < 0.24) & (np.abs(row - 0.52) < 0.26))
+@numba.njit(cache=True, nogil=True)
+def _is_window(along_m, z_m):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    column, row = along_m * np.float32(1.0 / _WINDOW_M), z_m * np.float32(1.0 / _FLOOR_M)
+    column, row = column - np.floor(column), row - np.floor(row)
+    return abs(column - np.float32(0.5)) < np.float32(0.24) and abs(row - np.float32(0.52)) < np.float32(0.26)
 
 
-def _noise(a_m: NDArray[np.float32], b_m: NDArray[np.float32], per_m: float) -> NDArray[np.float32]:
+@numba.njit(cache=True, nogil=True)
+def _noise(tile, a_m, b_m, per_m):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
     """Look noise up in the tile, `per_m` of its pixels a metre."""
-    scale = np.float32(per_m)
-    column = (a_m * scale).astype(np.int32) & (_TILE_PX - 1)
-    row = (b_m * scale).astype(np.int32) & (_TILE_PX - 1)
-    return np.take(_noise_tile(), row * _TILE_PX + column)
+    return tile[np.int32(b_m * per_m) & (_TILE_PX - 1), np.int32(a_m * per_m) & (_TILE_PX - 1)]
 
 
 @cache
 def _noise_tile() -> NDArray[np.float32]:
-    """Return a square tile (P * P,) of noise with fine and coarse grain, zero on average, mostly within -1..1."""
+    """Return a square tile (P, P) of noise with fine and coarse grain, zero on average, mostly within -1..1."""
     rng = np.random.default_rng(7)
     tile = np.zeros((_TILE_PX, _TILE_PX), np.float32)
     for sigma, weight in ((0.0, 0.45), (1.5, 0.5), (6.0, 0.5)):
@@ -179,12 +185,13 @@ def _noise_tile() -> NDArray[np.float32]:
             blurred = cv2.GaussianBlur(layer, (0, 0), sigma, borderType=cv2.BORDER_REFLECT)
             layer = np.asarray(blurred, np.float32)
         tile += np.float32(weight) * layer / layer.std()
-    return tile.reshape(-1)
+    return tile
 
 
-def _sky(camera: Camera, sunlight: Sunlight) -> NDArray[np.float32]:
-    """Return the sky's colour (N, 3) behind every pixel: paler towards the horizon, grey when overcast."""
+def _sky(camera: Camera, sunlight: Sunlight) -> NDArray[np.uint8]:
+    """Return the sky's colour (N, 3) behind every pixel, blue first: paler towards the horizon, grey when overcast."""
     height = np.clip(camera.rays_ego[:, 2] * 2.2, 0.0, 1.0)[:, None]
     clear, grey = np.array([112, 152, 206], np.float32), np.float32(178)
     top = clear * np.float32(1.0 - sunlight.overcast) + grey * np.float32(sunlight.overcast)
-    return np.asarray(np.array([216, 222, 228], np.float32) * (1.0 - height) + top * height, np.float32)
+    colour = np.array([216, 222, 228], np.float32) * (1.0 - height) + top * height
+    return np.asarray(np.rint(colour[:, ::-1].astype(np.float32)), np.uint8)
