@@ -166,7 +166,7 @@ def test_paper_cpu_has_the_rows_of_paper_and_the_stronger_baselines():
     for full, small in zip(paper, scaled, strict=False):
         assert full.model_dump(exclude=scaling) == small.model_dump(exclude=scaling)
     assert {(row.network.features, row.training.batch, row.repeats) for row in scaled} == {(32, 8, 1)}
-    assert {row.training.updates_until(row.training.epochs) for row in scaled} == {3000}
+    assert {row.training.updates_until(row.training.epochs) for row in scaled} == {2200}
 
 
 def test_real_trains_as_paper_cpu_and_scores_windows_that_fit_ten_frames():
