@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from semgrid_eval.files import write_text
+from semgrid_eval.report.provenance import data_sets
 from semgrid_eval.scores.results import ResultRecord, RunRecord, read_result, read_run, result_folder
 
 README = """# {title}
@@ -53,7 +54,7 @@ def facts(record: RunRecord, done: list[ResultRecord]) -> dict[str, str]:
     trained = [result.train_seconds for result in done if result.train_seconds is not None]
     return {
         "recordings": ", ".join(f"{count} {split}" for split, count in sorted(splits.items())),
-        "data set": ", ".join(sorted({log.dataset for log in record.logs})),
+        "data set": ", ".join(data_sets(record)),
         "rows": f"{len(record.rows)}" + (f", failed: {', '.join(failed)}" if failed else ""),
         "trainings": f"{len(trained)}, {sum(trained) / 60:.0f} minutes in all",
         "started": record.started,

@@ -2,15 +2,16 @@
 
 import hashlib
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from semgrid_eval.errors import LogError
+from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.executors import Executor, WorkerDied
-from semgrid_eval.files import DIGEST_CHARACTERS
+from semgrid_eval.files import DIGEST_CHARACTERS, read_json, write_json
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.progress import Progress
 
+KEPT = "fingerprints.json"
 _MESSAGE = struct.Struct("<qQ")
 
 
@@ -44,3 +45,40 @@ def fingerprints(paths: Sequence[Path], *, executor: Executor, progress: Progres
         found[index] = outcome
         progress(done, len(paths), paths[index].stem)
     return found
+
+
+def kept_fingerprints(
+    logs: Mapping[str, Path], cache: Path, *, executor: Executor, progress: Progress
+) -> dict[str, str]:
+    """Return the fingerprints of logs by their digests; a log that is damaged somewhere has none.
+
+    Args:
+        logs: paths by digest.
+        cache: folder that keeps what was found, so that it is found once.
+        executor: reads the logs.
+        progress: told of each log that is read.
+    """
+    kept = _kept(cache / KEPT)
+    missing = [digest for digest in logs if digest not in kept]
+    for done, (index, outcome) in enumerate(executor.run(_fingerprint_if_sound, [logs[d] for d in missing]), start=1):
+        if isinstance(outcome, str):
+            kept[missing[index]] = outcome
+        progress(done, len(missing), logs[missing[index]].stem)
+    if missing:
+        write_json(cache / KEPT, kept)
+    return {digest: kept[digest] for digest in logs if digest in kept}
+
+
+def _kept(path: Path) -> dict[str, str]:
+    try:
+        found = read_json(path)
+    except InputError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _fingerprint_if_sound(path: Path) -> str | None:
+    try:
+        return fingerprint(path)
+    except LogError:
+        return None

@@ -136,7 +136,7 @@ def report_record(
             {
                 "tag": run.tag,
                 "scaling": scaling(run),
-                "data": data_sets(run),
+                "data": data_sets(run.record),
                 "record": run.record.model_dump(mode="json", exclude={"rows"}),
             }
             for run in runs

@@ -8,10 +8,12 @@ import pandas as pd
 import yaml
 
 from semgrid_eval.files import digest_value
+from semgrid_eval.frames.synthetic.benchmark import FINGERPRINT_CHARACTERS, published_fingerprints
 from semgrid_eval.report.cells import Cell, Line, Table, plural
 from semgrid_eval.report.commands import row_command
 from semgrid_eval.report.reading import Row, Run
 from semgrid_eval.report.scaling import scaling
+from semgrid_eval.scores.results import LogRecord, RunRecord
 
 WINDOW_COLUMNS = ("window_set", "recording", "log", "target_frame", "target_stamp_ns", "input_stamps_ns")
 
@@ -52,22 +54,34 @@ def facts(run: Run, runs: Sequence[Run]) -> Facts:
         ("Command", record.command),
         ("Started", record.started),
         ("Duration", duration(record.seconds)),
-        *(("Data", text) for text in data_sets(run)),
+        *(("Data", text) for text in data_sets(record)),
         *((f"Version of {name}", version) for name, version in sorted(record.versions.items())),
         *((f"Machine: {name.replace('_', ' ')}", value) for name, value in sorted(record.machine.items())),
     ]
     return Facts(tuple(entries), scaling(run), matrix_text(run), matrix_file(run, runs))
 
 
-def data_sets(run: Run) -> list[str]:
-    """Name each data set of a run with its logs by split and a digest of them all, equal where all logs are."""
-    found: dict[str, list[tuple[str, str, str]]] = {}
-    for log in run.record.logs:
-        found.setdefault(log.dataset, []).append((log.split, log.name, log.digest))
-    return [
-        f"{name}: {_by_split(split for split, *_ in logs)}; digest {digest_value(sorted(logs))}"
-        for name, logs in sorted(found.items())
-    ]
+def data_sets(record: RunRecord) -> list[str]:
+    """Name each data set of a run with its logs by split and a digest of them all, equal where all logs are.
+
+    Of a published benchmark, say whether they are its logs.
+    """
+    found: dict[str, list[LogRecord]] = {}
+    for log in record.logs:
+        found.setdefault(log.dataset, []).append(log)
+    return [_data_set(name, logs) for name, logs in sorted(found.items())]
+
+
+def _data_set(name: str, logs: Sequence[LogRecord]) -> str:
+    digest = digest_value(sorted((log.split, log.name, log.digest) for log in logs))
+    text = f"{name}: {_by_split(log.split for log in logs)}; digest {digest}"
+    published = published_fingerprints(name)
+    known = [log.fingerprint[:FINGERPRINT_CHARACTERS] for log in logs if log.fingerprint]
+    if not published or not known:  # runs of older versions know none
+        return text
+    if others := len(logs) - sum(fingerprint in published for fingerprint in known):
+        return f"{text}; {others} of {len(logs)} are not as published"
+    return f"{text}; {'all' if len(logs) == len(published) else f'{len(logs)} of {len(published):,}'}, as published"
 
 
 def _by_split(splits: Iterable[str]) -> str:

@@ -8,8 +8,10 @@ import torch
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import Executor
 from semgrid_eval.files import digest_value
+from semgrid_eval.frames.synthetic.benchmark import published_fingerprints
 from semgrid_eval.grids.build import GridDataSet, build_grids
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.log.fingerprint import kept_fingerprints
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.matrix import Row
@@ -48,9 +50,20 @@ class Sources:
         self.log_of: dict[str, str] = {}  # path below the folder of logs, by name of the recording
 
     def prepare(self) -> None:
-        """Build all grids of the matrix now, as many logs at once as the executor works on."""
+        """Build all grids of the matrix now, as many logs at once as the executor works on.
+
+        The logs of benchmarks are fingerprinted, too, so that a report can hold them against the published ones.
+        """
         for config in self._configs.values():
             self._grids(config)
+        records = [record for record in self.records.values() if published_fingerprints(record.dataset)]
+        if records:
+            logs = {record.digest: self._folder / record.path for record in records}
+            with self._stage("compare") as progress:
+                found = kept_fingerprints(logs, self._cache, executor=self._executor, progress=progress)
+            for record in records:
+                known = record.model_copy(update={"fingerprint": found.get(record.digest)})
+                self.records[record.path] = known
 
     def data(self, config: GridConfig, split: str) -> GridData:
         """Return the grids of all recordings of one split.

@@ -44,6 +44,7 @@ class LogRecord(Config):
     digest: str
     split: str
     dataset: str
+    fingerprint: str | None = None  # of a benchmark's log: what it is held against the published ones by
 
 
 class WindowRecord(Config):

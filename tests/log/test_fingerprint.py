@@ -1,3 +1,4 @@
+import shutil
 from dataclasses import replace
 
 import pytest
@@ -6,7 +7,7 @@ from support.driving import driving
 from semgrid_eval.errors import LogError
 from semgrid_eval.executors import InProcess
 from semgrid_eval.log import writer
-from semgrid_eval.log.fingerprint import fingerprint, fingerprints
+from semgrid_eval.log.fingerprint import KEPT, fingerprint, fingerprints, kept_fingerprints
 from semgrid_eval.log.store import LogReader, write_log
 from semgrid_eval.progress import silent
 
@@ -44,10 +45,38 @@ def test_fingerprints_come_in_the_order_of_the_logs(path, tmp_path):
     assert found[0] != found[1]
 
 
-def test_a_damaged_log_is_named(path, tmp_path):
+@pytest.fixture
+def damaged(path, tmp_path):
     damaged = tmp_path / "damaged.mcap"
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 0xFF
     damaged.write_bytes(data)
+    return damaged
+
+
+def test_a_damaged_log_is_named(damaged):
     with pytest.raises(LogError, match=r"damaged\.mcap"):
         fingerprint(damaged)
+
+
+def kept(logs, cache):
+    return kept_fingerprints(logs, cache, executor=InProcess(), progress=silent)
+
+
+def test_what_was_found_once_is_kept(path, tmp_path):
+    gone = shutil.copy(path, tmp_path / "gone.mcap")
+    logs = {"a" * 16: path, "b" * 16: gone}
+    found = kept(logs, tmp_path)
+    assert found == dict.fromkeys(logs, fingerprint(path))
+    gone.unlink()
+    assert kept(logs, tmp_path) == found
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"a'])
+def test_what_is_kept_is_found_anew_where_it_cannot_be_read(path, tmp_path, text):
+    (tmp_path / KEPT).write_text(text)
+    assert kept({"a" * 16: path}, tmp_path) == {"a" * 16: fingerprint(path)}
+
+
+def test_a_damaged_log_has_no_fingerprint_beside_sound_ones(path, damaged, tmp_path):
+    assert kept({"a" * 16: damaged, "b" * 16: path}, tmp_path) == {"b" * 16: fingerprint(path)}

@@ -1,11 +1,14 @@
+import re
 from dataclasses import replace
 
 import pytest
 import yaml
 
+from semgrid_eval.frames.synthetic.benchmark import load_benchmark
 from semgrid_eval.report.provenance import command_table, data_sets, duration, matrix_file, matrix_text
 from semgrid_eval.report.reading import load_runs
 from semgrid_eval.runs.matrix import load_matrix
+from semgrid_eval.scores.results import read_run
 
 
 def test_every_row_has_its_command_and_says_what_became_of_it(run):
@@ -27,20 +30,47 @@ def test_the_matrix_beside_the_page_means_the_same_as_the_one_that_was_run(run, 
 
 
 def test_data_sets_are_named_with_their_logs_and_a_digest_that_tells_them_apart(run):
-    (found,) = load_runs([run])
-    logs = found.record.logs
+    logs = read_run(run).logs
     first = logs[0].model_copy(update={"split": "train"})
     named = tuple(log.model_copy(update={"dataset": "town-v1/small"}) for log in (first, *logs[1:]))
-    (text,) = data_sets(_with_logs(found, named))
-    assert text.startswith("town-v1/small: 1 log of train and 7 logs of val; digest ")
-    assert data_sets(_with_logs(found, named[::-1])) == [text]
+    (text,) = data_sets(with_logs(run, named))
+    assert re.fullmatch("town-v1/small: 1 log of train and 7 logs of val; digest [0-9a-f]{16}", text)
+    assert data_sets(with_logs(run, named[::-1])) == [text]
     changed = named[0].model_copy(update={"digest": "0" * 16})
-    assert data_sets(_with_logs(found, (changed, *named[1:]))) != [text]
-    assert len(data_sets(_with_logs(found, (logs[0], *named[1:])))) == 2
+    assert data_sets(with_logs(run, (changed, *named[1:]))) != [text]
+    assert len(data_sets(with_logs(run, (logs[0], *named[1:])))) == 2
 
 
-def _with_logs(run, logs):
-    return replace(run, record=run.record.model_copy(update={"logs": logs}))
+def with_logs(run, logs):
+    return read_run(run).model_copy(update={"logs": logs})
+
+
+@pytest.mark.parametrize(
+    ("chosen", "fingerprints", "said"),
+    [
+        (slice(None), {}, "; all, as published"),
+        (slice(3), {}, "; 3 of 420, as published"),
+        (slice(3), {1: "0" * 16}, "; 1 of 3 are not as published"),
+        (slice(3), {2: None}, "; 1 of 3 are not as published"),  # damaged where grids do not look
+        (slice(1), {0: None}, ""),  # a run of an older version
+    ],
+)
+def test_a_benchmarks_logs_are_held_against_the_published_ones(run, chosen, fingerprints, said):
+    (first, *_) = read_run(run).logs
+    published = load_benchmark("town-v1").sizes["small"].fingerprints.split()
+    logs = [
+        first.model_copy(update={"dataset": "town-v1/small", "fingerprint": f"{start}{'0' * 8}", "name": start})
+        for start in published[chosen]
+    ]
+    for index, fingerprint in fingerprints.items():
+        logs[index] = logs[index].model_copy(update={"fingerprint": fingerprint})
+    (text,) = data_sets(with_logs(run, tuple(logs)))
+    assert re.search("digest [0-9a-f]{16}(.*)", text)[1] == said
+
+
+def test_only_a_benchmarks_logs_are_held_against_anything(run):
+    logs = tuple(log.model_copy(update={"fingerprint": "0" * 16}) for log in read_run(run).logs)
+    assert "published" not in data_sets(with_logs(run, logs))[0]
 
 
 def test_the_matrix_lies_beside_the_page(page):

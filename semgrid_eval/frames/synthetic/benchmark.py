@@ -3,6 +3,7 @@
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, get_args
 
@@ -129,6 +130,16 @@ def compare(size: BenchmarkSize, found: Mapping[str, str]) -> Comparison:
     here = short_fingerprints(found)
     differing = tuple(label for label in sorted(found) if here[label] != published[label])
     return Comparison(benchmark_digest(here), benchmark_digest(published), differing)
+
+
+@cache
+def published_fingerprints(dataset: str) -> frozenset[str]:
+    """Return what is published of a benchmark by the name that its logs carry; empty where it is no benchmark's."""
+    for benchmark in map(load_benchmark, BENCHMARKS):
+        for name, size in benchmark.sizes.items():
+            if benchmark.dataset(name) == dataset:
+                return frozenset((size.fingerprints or "").split())
+    return frozenset()
 
 
 def short_fingerprints(found: Mapping[str, str]) -> dict[str, str]:

@@ -10,6 +10,7 @@ from semgrid_eval.frames.synthetic.benchmark import (
     benchmark_digest,
     compare,
     load_benchmark,
+    published_fingerprints,
     versions,
 )
 from semgrid_eval.frames.synthetic.kinds import KINDS
@@ -84,6 +85,11 @@ def test_the_digest_knows_names_but_not_their_order():
 def test_before_anything_is_published_there_is_nothing_to_differ_from():
     found = compare(size(None), FOUND)
     assert (found.published, found.differing) == (None, ())
+
+
+@pytest.mark.parametrize(("dataset", "count"), [("town-v1/small", 420), ("town-v1/full", 3475), ("synthetic", 0)])
+def test_every_recording_of_a_benchmark_is_published_with_a_fingerprint_of_its_own(dataset, count):
+    assert len(published_fingerprints(dataset)) == count
 
 
 def test_versions_name_what_renders():
