@@ -11,14 +11,14 @@ from pathlib import Path
 from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.executors import available_cores, local_executor
 from semgrid_eval.files import write_json
-from semgrid_eval.frames.synthetic.benchmark import (
+from semgrid_eval.frames.synthetic.benchmark import versions
+from semgrid_eval.frames.synthetic.published import (
     BENCHMARKS,
     SIZES,
     benchmark_digest,
     definition_file,
     load_benchmark,
     short_fingerprints,
-    versions,
 )
 from semgrid_eval.log.fingerprint import fingerprints
 from semgrid_eval.log.store import LogReader, find_logs

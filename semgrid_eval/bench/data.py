@@ -9,7 +9,8 @@ from semgrid_eval.bench.material import Material
 from semgrid_eval.bench.measurement import Measurement, processor_s, wall_s
 from semgrid_eval.frames.synthetic.drives import FRAME_COUNT
 from semgrid_eval.frames.synthetic.kinds import KINDS
-from semgrid_eval.frames.synthetic.recordings import RecordingPlan, Stereo, render_recording
+from semgrid_eval.frames.synthetic.recordings import RecordingPlan, render_recording
+from semgrid_eval.frames.synthetic.rig import Stereo
 from semgrid_eval.frames.synthetic.town import TownSpec, prepare_town
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig

@@ -11,11 +11,11 @@ from semgrid_eval.bench.measurement import Settings
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.frames.synthetic.recordings import (
     RecordingPlan,
-    Stereo,
     SyntheticConfig,
     plan_recordings,
     render_recording,
 )
+from semgrid_eval.frames.synthetic.rig import Stereo
 from semgrid_eval.frames.types import Recording
 from semgrid_eval.grids.build import GridRecording
 from semgrid_eval.log.store import write_log

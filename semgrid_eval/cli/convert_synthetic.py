@@ -12,16 +12,17 @@ from semgrid_eval.cli.convert import show
 from semgrid_eval.cli.work import chosen_executor, executor_options, workers_option
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
-from semgrid_eval.frames.synthetic.benchmark import (
+from semgrid_eval.frames.synthetic.benchmark import changed_versions
+from semgrid_eval.frames.synthetic.published import (
     BENCHMARKS,
     SIZES,
     Benchmark,
     Comparison,
     SizeName,
-    changed_versions,
     load_benchmark,
 )
-from semgrid_eval.frames.synthetic.recordings import Stereo, SyntheticConfig
+from semgrid_eval.frames.synthetic.recordings import SyntheticConfig
+from semgrid_eval.frames.synthetic.rig import Stereo
 from semgrid_eval.log.convert import ConversionSummary
 from semgrid_eval.log.town import convert_benchmark, convert_town, strays
 

@@ -4,7 +4,8 @@ from functools import partial
 from pathlib import Path
 
 from semgrid_eval.executors import Executor, local_executor
-from semgrid_eval.frames.synthetic.benchmark import Benchmark, Comparison, SizeName, compare
+from semgrid_eval.frames.synthetic.benchmark import config_of
+from semgrid_eval.frames.synthetic.published import Benchmark, Comparison, SizeName, compare
 from semgrid_eval.frames.synthetic.recordings import SyntheticConfig, plan_recordings, render_recording
 from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
 from semgrid_eval.log.fingerprint import fingerprints
@@ -64,7 +65,7 @@ def convert_benchmark(
         InputError: SUMO failed, a folder cannot be written to, or a log cannot be read again.
         MissingExtraError: SUMO or Embree is not installed.
     """
-    config, dataset = benchmark.config(size), benchmark.dataset(size)
+    config, dataset = config_of(benchmark, size), benchmark.dataset(size)
     summary = convert_town(config, out, workers=workers, cache=cache, executor=executor, dataset=dataset, stage=stage)
     if summary.failed:
         return summary, None

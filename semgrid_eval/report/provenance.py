@@ -8,7 +8,7 @@ import pandas as pd
 import yaml
 
 from semgrid_eval.files import digest_value
-from semgrid_eval.frames.synthetic.benchmark import FINGERPRINT_CHARACTERS, published_fingerprints
+from semgrid_eval.frames.synthetic.published import FINGERPRINT_CHARACTERS, published_fingerprints
 from semgrid_eval.report.cells import Cell, Line, Table, plural
 from semgrid_eval.report.commands import row_command
 from semgrid_eval.report.reading import Row, Run

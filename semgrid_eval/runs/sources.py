@@ -8,7 +8,7 @@ import torch
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import Executor
 from semgrid_eval.files import digest_value
-from semgrid_eval.frames.synthetic.benchmark import published_fingerprints
+from semgrid_eval.frames.synthetic.published import published_fingerprints
 from semgrid_eval.grids.build import GridDataSet, build_grids
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.fingerprint import kept_fingerprints

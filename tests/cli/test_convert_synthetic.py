@@ -11,7 +11,8 @@ from semgrid_eval.cli import convert_synthetic
 from semgrid_eval.cli.convert_synthetic import synthetic
 from semgrid_eval.cli.main import cli, main
 from semgrid_eval.frames.synthetic import sumo
-from semgrid_eval.frames.synthetic.benchmark import BenchmarkSize, SplitSize, load_benchmark, versions
+from semgrid_eval.frames.synthetic.benchmark import versions
+from semgrid_eval.frames.synthetic.published import BenchmarkSize, SplitSize, load_benchmark
 from semgrid_eval.log.fingerprint import fingerprint
 from semgrid_eval.log.store import LogReader, find_logs
 

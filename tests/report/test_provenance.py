@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from semgrid_eval.frames.synthetic.benchmark import load_benchmark
+from semgrid_eval.frames.synthetic.published import load_benchmark
 from semgrid_eval.report.provenance import command_table, data_sets, duration, matrix_file, matrix_text
 from semgrid_eval.report.reading import load_runs
 from semgrid_eval.runs.matrix import load_matrix

@@ -4,7 +4,7 @@ import importlib.util
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -14,12 +14,12 @@ from semgrid_eval.errors import MissingExtraError
 from semgrid_eval.frames.synthetic.drives import choose_drives
 from semgrid_eval.frames.synthetic.kinds import KINDS
 from semgrid_eval.frames.synthetic.rendering import RecordingPlan, render_recording
+from semgrid_eval.frames.synthetic.rig import Stereo
 from semgrid_eval.frames.synthetic.town import TownSpec, load_town, prepare_town
 from semgrid_eval.progress import Progress
 
-__all__ = ["RecordingPlan", "Stereo", "SyntheticConfig", "plan_recordings", "render_recording"]
+__all__ = ["RecordingPlan", "SyntheticConfig", "plan_recordings", "render_recording"]
 
-Stereo = Literal["modelled", "matched", "exact"]
 _POSITIONS_PER_KM2_S = 25_000
 _MAX_POSITIONS = 10_000_000  # of everybody in a town at every step; they are held in memory, some 200 bytes each
 

@@ -1,6 +1,7 @@
 """The camera of a recording: what it sees becomes the files of a frame, with the errors that were asked for."""
 
 from collections.abc import Sequence
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -22,6 +23,10 @@ _GREY_PNG = [
     _FILTER,
     _FILTER_UP,
 ]
+
+
+Stereo = Literal["modelled", "matched", "exact"]
+"""Where disparity comes from; `exact` has no errors of labels and motion either."""
 
 
 class Rig:
