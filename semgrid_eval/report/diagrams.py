@@ -50,8 +50,9 @@ def calibration_plots(found: Sequence[Where]) -> list[Plot]:
         cells.set(xlabel="certainty", ylabel="of all cells", yscale="log")
         cells.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g}%"))
         right.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
-        caption = "How often a model is right when it is so certain, above, and how many cells that are, below"
-        caption += " (first repeat). It is honest on the dotted line; error is the expected calibration error."
+        caption = "How often a model is right when it is so certain, above, and how many cells that are, below: of the"
+        caption += " cells that it does not leave unknown (first repeat). It is honest on the dotted line; error is the"
+        caption += " expected calibration error."
         return [finish(figure, "calibration", "calibration.csv", caption)]
 
 

@@ -1,6 +1,7 @@
 """Scores of each row with intervals: a bootstrap over recordings and, where there are several, over seeds.
 
-Every row of a report is resampled with the same draws of recordings, so that differences between rows are paired.
+Every row of a report is resampled with the same draws of recordings, and rows of as many seeds with the same draws of
+seeds, so that differences between rows are paired. A recording is a whole log, whatever stretches it was cut into.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CATEGORY_NAMES, CLASS_COUNT, CLASS_NAMES
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.report.reading import Result, Row
 from semgrid_eval.scores.iou import Counts, category_iou, class_iou, mean_finite, merged_category_iou
 
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 DRAWS = 1000
 LEVEL = 0.95
 CATEGORY_COLUMNS = ("static", "static_known", "small_static", "vehicles", "small_dynamic", "mean_known")
-MERGED_COLUMNS = tuple(f"merged_{name}" for name in CATEGORY_NAMES)
+MERGED_COLUMNS = tuple(f"merged_{name}" for name in CATEGORY_COLUMNS if name != "mean_known")
 COLUMNS = (*CLASS_NAMES, *CATEGORY_COLUMNS, *MERGED_COLUMNS)
 """Everything that is scored: the classes, the categories, and the categories with their classes merged."""
 LABELS = {
@@ -31,6 +32,7 @@ LABELS = {
     "mean_known": "Mean (known)",
     **{name: name.replace("_", " ") for name in CLASS_NAMES},
     "merged_static": "Static (merged)",
+    "merged_static_known": "Static (known, merged)",
     "merged_small_static": "Small static (merged)",
     "merged_vehicles": "Vehicles (merged)",
     "merged_small_dynamic": "Small dynamic (merged)",
@@ -89,17 +91,21 @@ def score_columns(counts: Counts) -> Array:
     """Score pooled counts (..., C, C) -> (..., Q) in the order of `COLUMNS`."""
     classes = class_iou(counts)
     categories, merged = category_iou(classes), merged_category_iou(counts)
-    parts = [categories[name] for name in CATEGORY_COLUMNS] + [merged[name] for name in CATEGORY_NAMES]
+    parts = [categories[name] for name in CATEGORY_COLUMNS] + [
+        merged[name.removeprefix("merged_")] for name in MERGED_COLUMNS
+    ]
     return np.concatenate([classes, np.stack(parts, axis=-1)], axis=-1)
 
 
 def score_rows(rows: Iterable[Row], generator: np.random.Generator, *, draws: int = DRAWS) -> dict[str, RowScores]:
     """Score rows by name, all of them with the same draws of recordings; rows without windows are left out."""
     rows = [row for row in rows if row.windows]
-    names = sorted({window.recording for row in rows for result in row.results for window in result.record.windows})
+    names = sorted({window.drive for row in rows for result in row.results for window in result.record.windows})
     weights = recording_weights(len(names), generator, draws=draws)
     index = {name: i for i, name in enumerate(names)}
-    return {row.name: _score_row(row, index, weights, generator) for row in rows}
+    counts = sorted({len(row.results) for row in rows})
+    picks = {count: generator.multinomial(count, np.full(count, 1 / count), size=len(weights)) for count in counts}
+    return {row.name: _score_row(row, index, weights, picks[len(row.results)]) for row in rows}
 
 
 def recording_weights(recordings: int, generator: np.random.Generator, *, draws: int) -> NDArray[np.int64]:
@@ -112,16 +118,12 @@ def recording_weights(recordings: int, generator: np.random.Generator, *, draws:
 def counts_by_recording(result: Result, index: dict[str, int]) -> NDArray[np.int64]:
     """Sum the counts of a result's windows by recording: -> (R, C, C)."""
     total = np.zeros((len(index), CLASS_COUNT, CLASS_COUNT), np.int64)
-    np.add.at(total, [index[window.recording] for window in result.record.windows], result.counts)
+    np.add.at(total, [index[window.drive] for window in result.record.windows], result.counts)
     return total
 
 
-def _score_row(
-    row: Row, index: dict[str, int], weights: NDArray[np.int64], generator: np.random.Generator
-) -> RowScores:
+def _score_row(row: Row, index: dict[str, int], weights: NDArray[np.int64], picks: NDArray[np.int64]) -> RowScores:
     by_seed = np.array([score_columns(result.counts.sum(axis=0, dtype=np.int64)) for result in row.results])
-    count = len(row.results)
-    picks = generator.multinomial(count, np.full(count, 1 / count), size=len(weights))  # (B, S)
     total, number = np.zeros((2, len(weights), len(COLUMNS)))
     for seed, result in enumerate(row.results):
         scores = _resampled_scores(counts_by_recording(result, index), weights)

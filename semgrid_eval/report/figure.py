@@ -78,7 +78,7 @@ def evidence(scores: Scores) -> str:
     """Count the windows and recordings behind a figure's rows."""
     windows = {entry.row.windows for entry in scores.values()}
     records = (w for entry in scores.values() for w in entry.row.results[0].record.windows)
-    recordings = len({window.recording for window in records})
+    recordings = len({window.drive for window in records})
     count = plural(max(windows), "window") if len(windows) == 1 else f"{min(windows)} to {max(windows)} windows"
     return f"{count} a row, {plural(recordings, 'recording')}"
 

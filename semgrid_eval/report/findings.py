@@ -37,6 +37,7 @@ class Outcome:
     verdict: Verdict
     difference: Estimate
     windows: int
+    text: str
     missing: tuple[str, ...] = ()
 
 
@@ -152,27 +153,30 @@ def _tag(findings: Sequence[Finding]) -> str:
 
 
 def _by_record(scores: Scores, run: Path) -> dict[str, RowScores]:
-    """Find a run's rows by the names that presets give them: the row's own name, else its model and experiment."""
+    """Find a run's rows by the names that presets give them: the row's own, else the one of its model and experiment.
+
+    Where several rows are of one model and experiment, nobody knows which of them a claim is about.
+    """
     mine = [entry for entry in scores.values() if entry.row.run == run]
-    found = {entry.row.record.name: entry for entry in mine}
-    for entry in mine:
-        found.setdefault(f"{entry.row.record.model}-{entry.row.record.experiment}", entry)
-    return found
+    kinds = [f"{entry.row.record.model}-{entry.row.record.experiment}" for entry in mine]
+    found = {kind: entry for kind, entry in zip(kinds, mine, strict=True) if kinds.count(kind) == 1}
+    return found | {entry.row.record.name: entry for entry in mine}
 
 
 def _outcome(check: Check, places: Mapping[str, Scores]) -> Outcome:
     rows = places.get(check.region, {})
+    text = check.text(lambda name: places[""][name].row.record.name if name in places[""] else name)
     missing = tuple(name for name in check.weights if name not in places[""])
     if not missing and any(name not in rows for name in check.weights):
         missing = (TRUTH,)
     if missing:
-        return Outcome(check, Verdict.NOT_RUN, Estimate(np.nan, np.nan, np.nan), 0, missing)
+        return Outcome(check, Verdict.NOT_RUN, Estimate(np.nan, np.nan, np.nan), 0, text, missing)
     if check.score == WINDOW_MS:
         difference = _time_difference(check, rows)
     else:
         difference = weighted_sum([(weight, rows[name]) for name, weight in check.weights.items()], check.score)
     windows = min(rows[name].row.windows for name in check.weights)
-    return Outcome(check, judge(check.rule, difference), difference, windows)
+    return Outcome(check, judge(check.rule, difference), difference, windows, text)
 
 
 def _time_difference(check: Check, rows: Scores) -> Estimate:
@@ -191,13 +195,13 @@ def _line(outcome: Outcome) -> Line:
     check, difference = outcome.check, outcome.difference
     if outcome.missing:
         needs = Cell(f"needs {', '.join(outcome.missing)}")
-        return Line(check.text, (_verdict_cell(outcome.verdict), needs, Cell(ABSENT)), "part")
+        return Line(outcome.text, (_verdict_cell(outcome.verdict), needs, Cell(ABSENT)), "part")
     if check.score == WINDOW_MS:
-        return Line(check.text, (_verdict_cell(outcome.verdict), Cell("ms a window"), _time_cell(difference)), "part")
+        return Line(outcome.text, (_verdict_cell(outcome.verdict), Cell("ms a window"), _time_cell(difference)), "part")
     label = LABELS[check.score] + (f", {check.region}" if check.region else "")
     title = f"{interval_phrase(difference, with_sign=True)}; {plural(outcome.windows, 'window')}"
     number = difference_cell(difference, title=title)
-    return Line(check.text, (_verdict_cell(outcome.verdict), Cell(label), number), "part")
+    return Line(outcome.text, (_verdict_cell(outcome.verdict), Cell(label), number), "part")
 
 
 def _time_cell(difference: Estimate) -> Cell:
@@ -212,7 +216,7 @@ def _verdict_cell(found: Verdict) -> Cell:
 def _values(outcome: Outcome) -> dict[str, Any]:
     check, difference = outcome.check, outcome.difference
     return {
-        "comparison": check.text.replace(MINUS, "-"),
+        "comparison": outcome.text.replace(MINUS, "-"),
         "score": check.score,
         "region": check.region or "all",
         "rule": check.rule,

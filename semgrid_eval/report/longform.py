@@ -6,25 +6,25 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_NAMES, category_members
+from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.estimates import CATEGORY_COLUMNS, COLUMNS, MERGED_COLUMNS, RowScores
-from semgrid_eval.scores.iou import averaged_members
+from semgrid_eval.scores.iou import averaged_members, merged_members
 
 
 def members() -> dict[str, tuple[int, ...]]:
     """Return the class ids behind each of `estimates.COLUMNS`."""
     table: dict[str, tuple[int, ...]] = {name: (index,) for index, name in enumerate(CLASS_NAMES)}
-    table |= averaged_members() | {f"merged_{name}": ids for name, ids in category_members().items()}
+    table |= averaged_members() | {f"merged_{name}": ids for name, ids in merged_members().items()}
     return {name: table[name] for name in COLUMNS}
 
 
 def class_table(scores: Sequence[RowScores]) -> pd.DataFrame:
-    """Return the table with columns experiment, model, class, iou, windows, cells, seed."""
+    """Return the table with columns row, experiment, model, class, iou, windows, cells, seed."""
     return _long(scores, CLASS_NAMES, "class")
 
 
 def category_table(scores: Sequence[RowScores]) -> pd.DataFrame:
-    """Return the table with columns experiment, model, category, iou, windows, cells, seed."""
+    """Return the table with columns row, experiment, model, category, iou, windows, cells, seed."""
     return _long(scores, (*CATEGORY_COLUMNS, *MERGED_COLUMNS), "category")
 
 
@@ -42,6 +42,7 @@ def _long(scores: Sequence[RowScores], names: tuple[str, ...], kind: str) -> pd.
             cells, seed = target_cells(result.counts), result.record.seed
             for name in names:
                 iou = values[COLUMNS.index(name)]
-                lines.append((record.experiment, record.model, name, iou, len(result.counts), cells[name], seed))
-    table = pd.DataFrame(lines, columns=["experiment", "model", kind, "iou", "windows", "cells", "seed"])
+                key = (entry.row.name, record.experiment, record.model)
+                lines.append((*key, name, iou, len(result.counts), cells[name], seed))
+    table = pd.DataFrame(lines, columns=["row", "experiment", "model", kind, "iou", "windows", "cells", "seed"])
     return table.astype({"iou": "float64", "windows": "int64", "cells": "int64", "seed": "Int64"})

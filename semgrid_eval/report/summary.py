@@ -8,7 +8,7 @@ from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, HEADLINE, Headlin
 from semgrid_eval.report.estimates import LABELS, Estimate, Scores
 from semgrid_eval.report.reading import Row, Run, key_of
 
-_FEW_RECORDINGS = 10
+_FEW_RECORDINGS, _FEW_SEEDS = 10, 5
 _WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
 
 
@@ -50,13 +50,13 @@ def _which(scores: Scores, found: Headline | None) -> str:
     if found is None:
         return "No row has a score: nothing can be compared."
     best = scores[found.best.name]
-    start = f"{found.best.name} predicts best: mean class IoU {number(best.mean[HEADLINE])} without unknown"
+    start = f"{found.best.name} has the highest mean class IoU, {number(best.mean[HEADLINE])} without unknown"
     if found.rival is None:
         return f"{start} ({interval_phrase(best.estimate(HEADLINE))}); there is no other row to compare with."
     lead = best.minus(scores[found.rival.name], HEADLINE)
-    kind = _kind(found.best, found.rival)
+    kind, word = _kind(found.best, found.rival), _WORDS[verdict(lead)]
     phrase = interval_phrase(lead, with_sign=True)
-    return f"{start}, {signed(lead.value)} over {found.rival.name}, {kind} ({phrase})."
+    return f"{start}: {signed(lead.value)} over {found.rival.name}, {kind}, {word} ({phrase})."
 
 
 def _against_reference(scores: Scores, found: Headline | None) -> str:
@@ -76,7 +76,7 @@ def _evidence(runs: Sequence[Run], scores: Scores) -> str:
     rows = [entry.row for entry in scores.values()]
     records = [window for row in rows for result in row.results for window in result.record.windows]
     windows = len(set(map(key_of, records)))
-    recordings = len({window.recording for window in records})
+    recordings = len({window.drive for window in records})
     text = f"This rests on {plural(windows, 'window')} from {plural(recordings, 'recording')}"
     seeds = [len(row.results) for row in rows if row.results[0].record.seed is not None]
     if seeds:
@@ -90,11 +90,11 @@ def _evidence(runs: Sequence[Run], scores: Scores) -> str:
 def _doubt(recordings: int, seeds: Sequence[int]) -> str:
     if recordings < 2:
         return " With fewer than two recordings there are no intervals."
-    if recordings < _FEW_RECORDINGS:
-        return " With so few recordings the intervals are rough."
-    if seeds and min(seeds) == 1:
-        return " Intervals of rows with one seed leave out the chance in training."
-    return ""
+    doubts = [" With so few recordings the intervals are rough."] if recordings < _FEW_RECORDINGS else []
+    if seeds and min(seeds) < _FEW_SEEDS:
+        part = "the" if min(seeds) == 1 else "much of the"
+        doubts.append(f" Intervals of rows with {plural(min(seeds), 'seed')} leave out {part} chance in training.")
+    return "".join(doubts)
 
 
 def _tiles(scores: Scores, found: Headline | None) -> tuple[str, tuple[Tile, ...]]:

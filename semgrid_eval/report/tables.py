@@ -56,7 +56,10 @@ def category_values(scores: Scores) -> Table:
 
 def merged_values(scores: Scores) -> Table:
     """Show the categories with their classes merged before counting."""
-    caption = "Category scores after merging the classes of a category, as the Cityscapes benchmark counts."
+    caption = (
+        "Category scores after merging the classes of a category, as the Cityscapes benchmark does. It leaves void out,"
+    )
+    caption += " as Static (known, merged) leaves out unknown."
     return value_table("merged", caption, scores, MERGED_COLUMNS)
 
 

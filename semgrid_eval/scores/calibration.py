@@ -31,11 +31,12 @@ class Reliability:
 
 
 def certainty_counts(target: Grid, prediction: Grid, certainty: Grid, mask: NDArray[np.bool_]) -> Counts:
-    """Count cells outside M that target or prediction know, by certainty: (N, H, W) each -> (256, wrong and right).
+    """Count cells outside M that are predicted to be known, by certainty: (N, H, W) each -> (256, wrong and right).
 
-    Cells that are rightly left unknown are no achievement and would drown all others.
+    Cells that are left unknown would drown all others. To keep those of them that the target knows would keep the
+    wrong ones alone, and make an honest model look overconfident.
     """
-    counted = ~mask & ((target != UNKNOWN) | (prediction != UNKNOWN))
+    counted = ~mask & (prediction != UNKNOWN)
     index = certainty[counted].astype(np.int64) * 2 + (target == prediction)[counted]
     return np.asarray(np.bincount(index, minlength=2 * LEVELS).reshape(LEVELS, 2), np.int64)
 

@@ -48,13 +48,24 @@ def averaged_members() -> dict[str, tuple[int, ...]]:
 
 
 def merged_category_iou(counts: Counts) -> dict[str, Scores]:
-    """Intersection over union after merging the classes of each category, as Cityscapes: (..., C, C) -> (...) each."""
-    names = list(category_members())
-    member = np.zeros((CLASS_COUNT, len(names)), np.int64)
-    for column, classes in enumerate(category_members().values()):
-        member[list(classes), column] = 1
-    merged = class_iou(member.T @ counts @ member)
-    return {name: merged[..., column] for column, name in enumerate(names)}
+    """Intersection over union after merging the classes of each category: (..., C, C) -> (...) for each category.
+
+    Cityscapes merges so, but knows no class `unknown`: `static_known` leaves it out.
+    """
+    return {name: _merged_iou(counts, classes) for name, classes in merged_members().items()}
+
+
+def merged_members() -> dict[str, tuple[int, ...]]:
+    """Return the class ids behind each merged score: the categories, and `static_known` without `unknown`."""
+    return {name: classes for name, classes in averaged_members().items() if name != "mean_known"}
+
+
+def _merged_iou(counts: Counts, classes: tuple[int, ...]) -> Scores:
+    ids = list(classes)
+    target, predicted = counts[..., ids, :], counts[..., :, ids]
+    hits = target[..., ids].sum(axis=(-2, -1))
+    union = target.sum(axis=(-2, -1)) + predicted.sum(axis=(-2, -1)) - hits
+    return np.asarray(np.divide(hits, union, out=np.full(union.shape, np.nan), where=union > 0))
 
 
 def mean_finite(values: Scores, *, axis: int = -1) -> Scores:

@@ -16,6 +16,7 @@ RUN/pictures/<key>.npz         small camera and label images of the windows' fra
 ```
 """
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,11 @@ class WindowRecord(Config):
     target_frame: int
     target_stamp_ns: int
     input_stamps_ns: tuple[int, ...] = ()  # oldest first; results of older versions have none
+
+    @property
+    def drive(self) -> str:
+        """The recording without the number of its stretch: stretches of one log are not independent of each other."""
+        return re.sub(r"#\d+$", "", self.recording)
 
 
 class ResultRecord(Config):

@@ -72,9 +72,11 @@ def test_the_summary_says_who_leads_by_how_much_and_on_what_it_rests(run):
     found = headline(scores)
     summary = summarise(runs, scores, found)
     lead = scores["ED-DC"].mean["mean_known"] - scores["BL-Fuse"].mean["mean_known"]
-    assert summary.sentences[0].startswith("ED-DC predicts best")
-    assert f"+{lead:.3f} over BL-Fuse" in summary.sentences[0]
+    assert summary.sentences[0].startswith("ED-DC has the highest mean class IoU, ")
+    assert f"+{lead:.3f} over BL-Fuse, the best baseline, clearly better (95% interval +" in summary.sentences[0]
     assert "16 windows from 8 recordings" in summary.sentences[2]
     assert "1 row failed" in summary.sentences[2]
+    assert "With so few recordings the intervals are rough." in summary.sentences[2]
+    assert summary.sentences[2].endswith("Intervals of rows with 2 seeds leave out much of the chance in training.")
     assert [tile.label for tile in summary.tiles][-1] == "Mean (known)"
     assert all(0 <= tile.low <= tile.at <= tile.high <= 100 for tile in summary.tiles)

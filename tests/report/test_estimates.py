@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -37,6 +39,8 @@ def test_columns_are_class_ious_means_of_categories_and_merged_categories(counts
         present = [classes[i] for i in ids if classes[i] == classes[i]]
         np.testing.assert_allclose(got[name], np.mean(present) if present else np.nan)
         np.testing.assert_allclose(got[f"merged_{name}"], _slow_iou(counts, set(ids)))
+    static = set(category_members()["static"]) - {UNKNOWN}
+    np.testing.assert_allclose(got["merged_static_known"], _slow_iou(counts, static))
 
 
 def test_counts_are_summed_by_recording(run):
@@ -80,6 +84,28 @@ def test_a_row_does_not_differ_from_itself(run):
     entry = score_rows(rows, np.random.default_rng(0))[rows[0].name]
     assert entry.minus(entry, "road") == Estimate(0.0, 0.0, 0.0)
     assert not entry.minus(entry, "road").sure
+
+
+def test_rows_that_share_their_trainings_do_not_differ(run):
+    row = next(row for row in load_runs([run])[0].rows if len(row.results) == 3)
+    twin = replace(row, name="twin")
+    scores = score_rows([row, twin], np.random.default_rng(0))
+    assert scores["twin"].minus(scores[row.name], "road") == Estimate(0.0, 0.0, 0.0)
+
+
+def test_stretches_of_one_log_are_resampled_together(run):
+    row = load_runs([run])[0].rows[0]
+    one = replace(row, results=tuple(map(_as_stretches, row.results)))
+    entry = score_rows([one], np.random.default_rng(0))[row.name]
+    assert np.isnan(entry.estimate("road").low)  # one log gives no interval, however many stretches it was cut into
+
+
+def _as_stretches(result):
+    windows = tuple(
+        window.model_copy(update={"recording": f"drive#{number}"})
+        for number, window in enumerate(result.record.windows)
+    )
+    return replace(result, record=result.record.model_copy(update={"windows": windows}))
 
 
 def test_pairing_makes_differences_surer_than_the_rows_alone(run):

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,21 @@ def test_a_claim_is_not_run_without_its_rows_and_names_them():
     assert found["large-BL-Fuse"].missing == ("ED-DC", "BL-Fuse")
     assert found["horizon-falls"].missing == ("ED-DC", "ED-PH1", "ED-PH2", "ED-PH3")
     assert found["deeper-better"].missing == ("ED-d4-f64", "ED-d2-f64")
+
+
+def _named(row, name):
+    return replace(row, name=name, record=row.record.model_copy(update={"name": name}))
+
+
+def test_a_row_of_another_name_stands_for_its_experiment_and_is_named():
+    (outcome, _) = _findings(_row("BL-DC"), _named(_row("ED-DC", 60), "mine"))["large-BL-DC"].outcomes
+    assert (outcome.verdict, outcome.text) == (HOLDS, "mine \N{MINUS SIGN} BL-DC")
+
+
+def test_several_rows_of_one_experiment_stand_for_no_claim():
+    rows = [_named(_row("ED-DC", 60), "short"), _named(_row("ED-DC", 70), "long")]
+    assert _findings(_row("BL-DC"), *rows)["large-BL-DC"].missing == ("ED-DC",)
+    assert _findings(_row("BL-DC"), *rows, _row("ED-DC", 45))["large-BL-DC"].verdict is FAILS
 
 
 def test_a_claim_that_is_run_in_part_fails_but_does_not_hold():
@@ -177,7 +193,7 @@ def test_every_claim_can_hold_fail_and_stay_undecided(claim, wanted):
     scores = score_rows(run.rows, np.random.default_rng(0), draws=100)
     found = {each.claim.name: each for each in find([run], scores, score_regions(run.rows, 0))}[claim.name]
     assert found.claim.checks == next(c.checks for c in claims(builds or ROWS) if c.name == claim.name)
-    assert found.verdict is wanted, [(o.check.text, o.verdict, o.difference) for o in found.outcomes]
+    assert found.verdict is wanted, [(o.text, o.verdict, o.difference) for o in found.outcomes]
 
 
 @given(st.floats(-1, 1), st.floats(0, 1))

@@ -19,10 +19,10 @@ COUNTS = arrays(np.int64, (256, 2), elements=st.integers(0, 9), fill=st.just(0))
 
 @settings(max_examples=40)
 @given(GRIDS, GRIDS, arrays(np.uint8, SHAPE), arrays(np.bool_, SHAPE))
-def test_certainty_is_counted_of_known_cells_outside_the_mask(target, prediction, certainty, mask):
+def test_certainty_is_counted_of_cells_outside_the_mask_that_are_predicted_known(target, prediction, certainty, mask):
     expected = np.zeros((256, 2), int)
     for at in np.ndindex(SHAPE):
-        if not mask[at] and (target[at] != UNKNOWN or prediction[at] != UNKNOWN):
+        if not mask[at] and prediction[at] != UNKNOWN:
             expected[certainty[at], int(target[at] == prediction[at])] += 1
     np.testing.assert_array_equal(certainty_counts(target, prediction, certainty, mask), expected)
 
@@ -73,3 +73,13 @@ def test_who_is_always_certain_errs_as_often_as_wrong():
     assert expected_calibration_error(counts) == 0.25
     counts[0] = [4, 0]  # never certain and never right: perfectly calibrated
     assert expected_calibration_error(counts) == 0.125
+
+
+def test_who_is_as_often_right_as_it_is_certain_has_no_error():
+    random = np.random.default_rng(4)
+    shape = (40, 64, 64)
+    certainty = random.integers(128, 256, shape).astype(np.uint8)
+    prediction = random.integers(0, 3, shape).astype(np.uint8)  # a third of the cells unknown
+    is_right = random.random(shape) < certainty / 255
+    target = np.where(is_right, prediction, (prediction + random.integers(1, 3, shape)) % 3).astype(np.uint8)
+    assert expected_calibration_error(certainty_counts(target, prediction, certainty, np.zeros(shape, bool))) < 0.005
