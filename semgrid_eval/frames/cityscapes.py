@@ -53,7 +53,8 @@ def find_sequences(
         camera_name: what the camera shall be called.
 
     Raises:
-        InputError: there is no such folder or split, no sequence in it, or the camera cannot be called so.
+        InputError: there is no such folder or split, no sequence in it, a label image's name says the other kind of
+            ids, or the camera cannot be called so.
     """
     if not _CAMERA_NAME.fullmatch(camera_name):
         raise InputError(f"{camera_name!r} is no name of letters, digits, _ and -", field="camera name")
@@ -143,11 +144,13 @@ class _LabelFiles:
     """Finds the label images of a frame: gtFine's, or those in a folder whose names begin with the frame's.
 
     Where a folder has several for a frame, those named `*labelIds.png` (`*labelTrainIds.png` for train ids) are meant.
+    Without such a one, any that is named as the other kind is an error: each kind can pass for the other unnoticed.
     """
 
     def __init__(self, folder: Path | None, images: Iterable[Path], *, train_ids: bool) -> None:
         self._folder = folder
-        self._kind = "labelTrainIds" if train_ids else "labelIds"
+        self._kind, self._other = ("labelTrainIds", "labelids") if train_ids else ("labelIds", "trainids")
+        self._advice = "label ids; leave out --train-ids" if train_ids else "train ids; add --train-ids"
         self._found: dict[str, list[Path]] = defaultdict(list)
         if folder is not None:
             frames = {frame_name(image) for image in images}
@@ -168,4 +171,7 @@ class _LabelFiles:
             return (label,) if label.is_file() else ()
         found = tuple(self._found.get(frame_name(image), ()))
         exact = tuple(path for path in found if path.stem.lower().endswith(self._kind.lower()))
-        return exact if len(found) > 1 and exact else found
+        for path in found if not exact else ():
+            if path.stem.lower().endswith(self._other):
+                raise InputError(f"is named as {self._advice}", path=path)
+        return exact or found

@@ -1,6 +1,6 @@
 """Check a log: is it whole, are its channels complete, and are times, calibration, motion and pictures plausible?"""
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
@@ -31,6 +31,7 @@ VALID_DISPARITY = 0.02
 GAP_PERIODS = 1.5
 JITTER_PERIODS = 0.2
 _LAST_LABEL_ID = max(label.label_id for label in CITYSCAPES_LABELS)
+_LAST_TRAIN_ID = max(label.train_id for label in CITYSCAPES_LABELS if label.train_id != 255)
 _NS_PER_S = 1e9
 
 _SCHEMAS = {
@@ -100,12 +101,16 @@ def _findings(log: LogReader, stamps_ns: dict[str, list[int]]) -> Iterator[Findi
         yield _warning("file", "has no checksums, so damage cannot be seen")
     if not log.scene.cameras:
         yield _error("cameras", "there is none")
+    label_ids: set[int] = set()
     for camera in log.scene.cameras:
         broken = list(_channels(log, camera, stamps_ns))
         yield from broken
         if not any(finding.severity is Severity.ERROR for finding in broken):
             yield from _times(camera_topic(camera, topics.DISPARITY), stamps_ns)
-            yield from _pictures(log, camera)
+            label_ids |= yield from _pictures(log, camera)
+    if label_ids and max(label_ids) <= _LAST_TRAIN_ID:
+        what = f"the largest is {max(label_ids)}, so they look like train ids"
+        yield _warning("labels", f"{what}; convert again with --train-ids")
     yield from _times(topics.EGO_MOTION, stamps_ns)
     yield from _coverage(log, stamps_ns)
     yield from _motion(log.motion())
@@ -183,29 +188,30 @@ def _motion(samples: list[MotionSample]) -> Iterator[Finding]:
         yield _warning(f"{topics.EGO_MOTION}: speed_mps", f"changes by {worst:.0f} m/s within a second")
 
 
-def _pictures(log: LogReader, camera: str) -> Iterator[Finding]:
-    """Decode every label and disparity image; stop at the first broken one of a camera."""
+def _pictures(log: LogReader, camera: str) -> Generator[Finding, None, set[int]]:
+    """Decode every label and disparity image and return the label ids; stop at the first broken one of a camera."""
     size: tuple[int, int] | None = None
     valid: list[float] = []
-    strange: set[int] = set()
+    label_ids: set[int] = set()
     for frame in log.frames(camera, images=True):
         try:
             size = _require_size(frame, size)
             valid.append(float((decode_gray(frame.disparity_png, bit_depth=16) > 0).mean()))
             if frame.label_png is not None:
-                strange.update(np.unique(decode_gray(frame.label_png, bit_depth=8)).tolist())
+                label_ids.update(np.unique(decode_gray(frame.label_png, bit_depth=8)).tolist())
         except InputError as error:
             yield _error(f"camera {camera}", f"picture at {frame.stamp_ns} ns: {error}")
-            return
+            return label_ids
     if size is not None:
         yield from _calibration(log.calibration(camera), camera_topic(camera, topics.CALIBRATION), size)
     if valid and min(valid) < VALID_DISPARITY:
         message = f"one frame has a disparity at only {100 * min(valid):.1f} % of its pixels"
         yield _warning(camera_topic(camera, topics.DISPARITY), message)
-    unknown = sorted(value for value in strange if value > _LAST_LABEL_ID)
+    unknown = sorted(value for value in label_ids if value > _LAST_LABEL_ID)
     if unknown:
         message = f"holds {unknown[:5]}, which are no Cityscapes label ids (are they train ids?)"
         yield _warning(camera_topic(camera, topics.LABEL), message)
+    return label_ids
 
 
 def _require_size(frame: CameraFrame, size: tuple[int, int] | None) -> tuple[int, int]:

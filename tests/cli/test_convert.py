@@ -24,9 +24,9 @@ def tree(tmp_path):
     return Tree(tmp_path / "cityscapes")
 
 
-def labelled(tree, folder, *, highest=33):
+def labelled(tree, folder, *, kind="LabelIds", highest=33):
     for name in tree.write(range(3)):
-        put(folder / f"{name}_predLabelIds.png", tree.label(highest=highest))
+        put(folder / f"{name}_pred{kind}.png", tree.label(highest=highest))
 
 
 def test_example_of_the_help_runs(tree, tmp_path, monkeypatch, capsys):
@@ -59,13 +59,21 @@ def test_faulty_sequences_are_named_and_the_rest_is_converted(tree, tmp_path, ca
 
 
 def test_options_reach_the_log(tree, tmp_path):
-    labelled(tree, tmp_path / "labels", highest=18)
+    labelled(tree, tmp_path / "labels", kind="LabelTrainIds", highest=18)
     options = ("--labels", tmp_path / "labels", "--train-ids", "--camera-name", "left", "--split", "val")
     assert run("convert", "cityscapes", tree.root, tmp_path / "logs", *options) == 0
     (path,) = find_logs(tmp_path / "logs")
     with LogReader(path) as log:
         assert log.scene.cameras == ("left",)
         assert all(frame.label_png is not None for frame in log.frames("left"))
+
+
+def test_labels_of_the_other_kind_are_one_line_without_traceback(tree, tmp_path, capsys):
+    labelled(tree, tmp_path / "labels", kind="LabelTrainIds", highest=18)
+    assert run("convert", "cityscapes", tree.root, tmp_path / "logs", "--labels", tmp_path / "labels") == 1
+    first = tmp_path / "labels" / "aachen_000000_000000_predLabelTrainIds.png"
+    assert capsys.readouterr().err == f"Error: {first}: is named as train ids; add --train-ids\n"
+    assert not (tmp_path / "logs").exists()
 
 
 def test_wrong_folder_is_one_line_without_traceback(tmp_path, capsys):

@@ -212,6 +212,24 @@ def test_label_ids_taken_for_train_ids_are_noticed(tree, tmp_path):
         frames(only(tree, labels=tmp_path / "labels", train_ids=True))
 
 
+@pytest.mark.parametrize("others", [(), ("gtFine_color",)])
+@pytest.mark.parametrize(
+    ("kind", "train_ids", "expected"),
+    [
+        ("gtFine_labelTrainIds", False, "is named as train ids; add --train-ids"),
+        ("predTrainIDs", False, "is named as train ids; add --train-ids"),
+        ("predLabelIds", True, "is named as label ids; leave out --train-ids"),
+    ],
+)
+def test_labels_whose_name_says_the_other_kind_are_refused(tree, tmp_path, kind, train_ids, expected, others):
+    (name,) = tree.write([0])
+    for each in (kind, *others):
+        put(tmp_path / "labels" / f"{name}_{each}.png", tree.label(highest=18))
+    with pytest.raises(InputError) as caught:
+        find_sequences(tree.root, labels=tmp_path / "labels", train_ids=train_ids)
+    assert str(caught.value) == f"{tmp_path / 'labels' / name}_{kind}.png: {expected}"
+
+
 def test_labels_of_other_frames_alone_are_noticed(tree, tmp_path):
     tree.write([0])
     put(tmp_path / "labels" / "berlin_000000_000000.png", tree.label())

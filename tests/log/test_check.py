@@ -163,6 +163,32 @@ def test_empty_disparity_is_a_warning(tmp_path):
     )
 
 
+def with_labels(moment, highest):
+    return with_frame(moment, label_png=encode_gray(np.full((32, 64), highest, np.uint8)))
+
+
+def test_labels_that_look_like_train_ids_are_one_warning_a_log(tmp_path):
+    expected = (Severity.WARNING, "the largest is 18, so they look like train ids; convert again with --train-ids")
+    assert findings(tmp_path, lambda number, moment: with_labels(moment, 18 - number)) == {"labels": expected}
+
+    def two(number, moment):
+        (frame,) = with_labels(moment, 18).cameras.values()
+        return replace(moment, cameras={"front": frame, "rear": frame})
+
+    both = {"front": CALIBRATION, "rear": CALIBRATION}
+    write_log(replace(driving(), moments=lambda: smooth(two), calibrations=both), tmp_path / "two.mcap")
+    assert [finding.place for finding in check_log(tmp_path / "two.mcap").findings] == ["labels"]
+
+
+def test_one_larger_label_in_a_whole_log_says_that_they_are_label_ids(tmp_path):
+    assert findings(tmp_path, lambda number, moment: with_labels(moment, 21 if number == 7 else 7)) == {}
+
+
+def test_log_without_labels_is_not_said_to_hold_train_ids(tmp_path):
+    found = findings(tmp_path, lambda number, moment: with_frame(moment, label_png=None))
+    assert list(found) == ["/camera/front/label"]
+
+
 def test_values_that_are_no_labels_are_a_warning(tmp_path):
     train_ids = encode_gray(np.full((32, 64), 255, np.uint8))
     found = findings(tmp_path, lambda number, moment: with_frame(moment, label_png=train_ids))
