@@ -20,6 +20,7 @@ _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEADER = struct.Struct(">IIBBBBB")
 _CHUNK_OVERHEAD_BYTES = 12  # length, type and CRC
 _COLOUR_TYPES = {0: "gray", 2: "colour", 3: "palette", 4: "gray with alpha", 6: "colour with alpha"}
+_DECODER_ERRORS = (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, Image.DecompressionBombError)
 
 
 class PngHeader(NamedTuple):
@@ -49,7 +50,8 @@ def read_header(data: bytes, path: Path | None = None) -> PngHeader:
         path: where it comes from, for error messages.
 
     Raises:
-        InputError: it is no PNG file, a chunk's checksum is wrong, its end is missing, or its size is out of bounds.
+        InputError: it is no PNG file, a chunk's checksum is wrong, its end is missing, it has several headers, or its
+            size is out of bounds.
     """
     chunks = list(_chunks(data, path))
     kinds = [chunk.kind for chunk in chunks]
@@ -57,6 +59,8 @@ def read_header(data: bytes, path: Path | None = None) -> PngHeader:
         raise InputError("is no PNG file: it does not begin with a header", path=path)
     if kinds[-1] != b"IEND" or b"IDAT" not in kinds:
         raise InputError("is a damaged PNG file: it ends early", path=path)
+    if kinds.count(b"IHDR") > 1:  # decoders may obey another one than the one whose size is checked here
+        raise InputError(f"is a damaged PNG file: it has {kinds.count(b'IHDR')} headers", path=path)
     header = PngHeader(*_HEADER.unpack_from(data, chunks[0].start + 8)[:4])
     if not 0 < header.width * header.height <= MAX_PIXELS:
         raise InputError(f"is {header}; 1 to {MAX_PIXELS} pixels are allowed", path=path)
@@ -143,7 +147,7 @@ def _pixels(data: bytes, path: Path | None, *, mode: str | None = None) -> NDArr
     try:
         with Image.open(io.BytesIO(data), formats=["PNG"]) as picture:
             return np.array(picture if mode is None else picture.convert(mode))
-    except (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error) as error:
+    except _DECODER_ERRORS as error:
         raise InputError(f"is a damaged PNG file: {error}", path=path) from error
 
 

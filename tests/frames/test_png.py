@@ -127,6 +127,21 @@ def test_size_is_bounded_before_anything_is_decoded():
     assert read_header(png(side, side, 8, 0, pixels)).width == side
 
 
+def test_a_second_header_is_refused_before_anything_is_decoded():
+    small, large = (struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0) for side in (3, 50_000))
+    data = png(3, 3, 8, 0, chunk(b"IHDR", large), chunk(b"IDAT", zlib.compress(bytes(12))))
+    again = png(3, 3, 8, 0, chunk(b"IDAT", zlib.compress(bytes(12))), chunk(b"IHDR", small))
+    for each in (data, again):
+        with pytest.raises(InputError, match=r"twice\.png: is a damaged PNG file: it has 2 headers"):
+            decode_gray(each, bit_depth=8, path="twice.png")
+
+
+def test_what_pillow_holds_for_too_large_is_an_error_of_the_file(monkeypatch):
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 4)
+    with pytest.raises(InputError, match=r"large\.png: is a damaged PNG file: Image size \(9 pixels\) exceeds"):
+        decode_gray(encode_gray(np.zeros((3, 3), np.uint8)), bit_depth=8, path="large.png")
+
+
 @pytest.mark.parametrize("data", [b"", b"GIF89a", b"\x89PNG\r\n\x1a\n", png(1, 1, 8, 0)[:8] + png(1, 1, 8, 0)[33:]])
 def test_what_is_no_png_is_refused(data):
     with pytest.raises(InputError, match="PNG"):
