@@ -16,7 +16,7 @@ Every fault fails its recording as a whole and names the file: a lost frame, a m
 file, several label images of a frame, no camera file at all, camera files that differ, time stamps that do not grow,
 a picture of another size or bit depth, a damaged picture, broken JSON, a missing or impossible value. No frame is
 dropped, because windows count frames: a hole would move every later target in time. Frames without a label image are
-no fault.
+no fault. Files whose names begin with a dot, such as those that macOS leaves beside others, are ignored.
 """
 
 import re
@@ -63,7 +63,8 @@ def find_sequences(
         raise InputError("is no folder; a Cityscapes sequence tree has one", path=root)
     if labels is not None and not labels.is_dir():
         raise InputError("is no folder of label images", path=labels)
-    images = [image for split in _splits(root, splits) for image in sorted((root / split).glob("*/*_leftImg8bit.png"))]
+    pattern = "*/[!.]*_leftImg8bit.png"
+    images = [image for split in _splits(root, splits) for image in sorted((root / split).glob(pattern))]
     runs = list(_runs(images))
     label_files = _LabelFiles(labels, images, train_ids=train_ids)
     if labels is not None and not label_files.found_any:

@@ -97,6 +97,17 @@ def test_sequences_of_all_splits_and_cities_come_sorted(tree):
     assert {sequence.split for sequence in find_sequences(tree.root, splits=["val", "test"])} == {"val", "test"}
 
 
+def test_files_whose_names_begin_with_a_dot_are_ignored(tree, tmp_path):
+    tree.gt_fine = True
+    for name in tree.write(range(2)):
+        put(tmp_path / "labels" / f"{name}_labelIds.png", tree.label())
+    plain, labelled = only(tree), only(tree, labels=tmp_path / "labels")
+    for path in (*tree.root.rglob("*.*"), *(tmp_path / "labels").iterdir()):
+        put(path.with_name(f"._{path.name}"), b"\0\5\x16\7")
+    assert find_sequences(tree.root) == [plain]
+    assert find_sequences(tree.root, labels=tmp_path / "labels") == [labelled]
+
+
 def test_gps_may_be_absent(tree):
     (name,) = tree.write([0])
     change_json(tree.vehicle(name), lambda value: (value.pop("gpsLatitude"), value.update(gpsHeading=None)))
