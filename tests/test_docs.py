@@ -9,6 +9,7 @@ import pytest
 import torch
 import yaml
 
+from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.cli.main import cli
 from semgrid_eval.models.predictor import load_predictor
 from semgrid_eval.runs.matrix import load_matrix
@@ -31,7 +32,7 @@ def commands():
 def workplace(tmp_path, monkeypatch):
     """Everything that README's commands take as given."""
     monkeypatch.chdir(tmp_path)
-    for folder in ("SRC", "PREDICTIONS", "logs/val", "recordings", "runs/first"):
+    for folder in ("SRC", "PREDICTIONS", "logs/val", "recordings", "runs/first", "runs/paper/trainings"):
         Path(folder).mkdir(parents=True)
     for file in ("logs/val/a.mcap", "network.onnx"):
         Path(file).touch()
@@ -55,16 +56,20 @@ def test_matrices_of_the_readme_load(tmp_path):
         if "rows:" in block:
             (tmp_path / "m.yaml").write_text(block)
             loaded += len(load_matrix(str(tmp_path / "m.yaml")).rows)
-    assert loaded == 10
+    assert loaded == 8
 
 
-def test_model_of_the_readme_predicts_the_newest_grid(tmp_path):
-    (tmp_path / "mine.py").write_text(next(block for block in blocks("python") if "class Newest" in block))
-    past = torch.randint(0, 10, (2, 1, 2, 8, 8), dtype=torch.uint8)
+def test_model_of_the_readme_loads_its_weights_and_gives_probabilities(tmp_path):
+    (tmp_path / "mine.py").write_text(blocks("python")[0])
+    keep = torch.nn.init.dirac_(torch.empty(CLASS_COUNT, CLASS_COUNT, 5, 5))  # each class stays where it is
+    torch.save({"layer.weight": keep, "layer.bias": torch.zeros(CLASS_COUNT)}, tmp_path / "mine.pt")
+    past = torch.randint(0, CLASS_COUNT, (2, 1, 2, 8, 8), dtype=torch.uint8)
     empty = torch.zeros(2, 8, 8)
     batch = WindowBatch(past, ("full",), torch.zeros(2, 2, 2), torch.zeros(2, 2), empty, empty.bool())
-    answer = load_predictor(f"{tmp_path}/mine.py:Newest")(batch)
+    with torch.inference_mode():
+        answer = load_predictor(f"{tmp_path}/mine.py:Mine")(batch)
     assert torch.equal(answer.argmax(dim=1), past[:, 0, -1].long())
+    torch.testing.assert_close(answer.sum(dim=1), torch.ones(2, 8, 8))
 
 
 @pytest.mark.parametrize("page", ["README.md", "ARCHITECTURE.md", "docs/town.md", "reports/README.md"])
