@@ -7,9 +7,10 @@ import click
 
 from semgrid_eval.cli.console import progress, say
 from semgrid_eval.cli.work import chosen_executor, executor_options, workers_option
-from semgrid_eval.errors import MissingExtraError
+from semgrid_eval.errors import InputError, MissingExtraError
 from semgrid_eval.frames.cityscapes import CAMERA_NAME, find_sequences
 from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
+from semgrid_eval.log.store import find_logs
 
 _EXTRA_SOURCES = {"synthetic": "semgrid_eval.cli.convert_synthetic"}
 
@@ -47,12 +48,31 @@ def _not_installed(extra: str, package: str) -> click.Command:
     )
 
 
-def show(summary: ConversionSummary, out: Path) -> int:
-    """Print what became of a conversion and return the exit code."""
+def show(summary: ConversionSummary, out: Path, *, benchmark: bool = False) -> int:
+    """Print what became of a conversion, of a benchmark or not, and return the exit code."""
     for label, reason in summary.failed.items():
         say(f"Error: {label}: {reason}")
     say(f"{out}: {len(summary.written)} written, {len(summary.skipped)} up to date, {len(summary.failed)} failed")
+    others = _strays(out, summary, all_splits=benchmark)
+    if others:
+        whole = "the benchmark" if benchmark else "this conversion"
+        say(f"Warning: {out} holds {len(others)} logs that do not belong to {whole}, such as {others[0]}")
     return 1 if summary.failed else 0
+
+
+def _strays(out: Path, summary: ConversionSummary, *, all_splits: bool) -> list[Path]:
+    """Return the logs that a conversion neither wrote nor found there.
+
+    Unless it is for all splits, those of other splits do not count: each may be converted by a command of its own.
+    """
+    known = {*summary.written, *summary.skipped, *summary.failed}
+    splits = {label.split("/")[0] for label in known}
+    try:
+        logs = find_logs(out)
+    except InputError:  # every recording failed
+        return []
+    labels = {log: log.relative_to(out).with_suffix("").as_posix() for log in logs}
+    return [log for log in logs if labels[log] not in known and (all_splits or labels[log].split("/")[0] in splits)]
 
 
 @click.group("convert", cls=_Sources)

@@ -24,7 +24,7 @@ from semgrid_eval.frames.synthetic.published import (
 from semgrid_eval.frames.synthetic.recordings import SyntheticConfig
 from semgrid_eval.frames.synthetic.rig import Stereo
 from semgrid_eval.log.convert import ConversionSummary
-from semgrid_eval.log.town import convert_benchmark, convert_town, strays
+from semgrid_eval.log.town import convert_benchmark, convert_town
 
 _Command = Callable[..., Any]
 _DEFAULTS = {name: field.default for name, field in SyntheticConfig.model_fields.items()}
@@ -100,10 +100,7 @@ def synthetic(
 def _show_benchmark(
     out: Path, benchmark: Benchmark, size: SizeName, summary: ConversionSummary, comparison: Comparison | None
 ) -> int:
-    code = show(summary, out)
-    others = strays(out, summary)
-    if others:
-        say(f"Warning: {out} holds {len(others)} logs that do not belong to the benchmark, such as {others[0]}")
+    code = show(summary, out, benchmark=True)
     total = len(summary.written) + len(summary.skipped) + len(summary.failed)
     say(_verdict(f"{benchmark.name} {size}", comparison, total, benchmark.sizes[size].versions))
     return code

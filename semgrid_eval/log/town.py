@@ -9,7 +9,7 @@ from semgrid_eval.frames.synthetic.published import Benchmark, Comparison, SizeN
 from semgrid_eval.frames.synthetic.recordings import SyntheticConfig, plan_recordings, render_recording
 from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
 from semgrid_eval.log.fingerprint import fingerprints
-from semgrid_eval.log.store import SUFFIX, find_logs
+from semgrid_eval.log.store import SUFFIX
 from semgrid_eval.progress import Stage, silent_stage
 
 CACHE = ".towns"
@@ -74,9 +74,3 @@ def convert_benchmark(
     with stage("compare") as progress:
         found = fingerprints(logs, executor=local_executor(workers), progress=progress)
     return summary, compare(benchmark.sizes[size], dict(zip(labels, found, strict=True)))
-
-
-def strays(out: Path, summary: ConversionSummary) -> list[Path]:
-    """Return the logs of a folder that a conversion neither wrote nor found there."""
-    known = {*summary.written, *summary.skipped, *summary.failed}
-    return [log for log in find_logs(out) if log.relative_to(out).with_suffix("").as_posix() not in known]

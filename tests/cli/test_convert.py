@@ -68,6 +68,28 @@ def test_options_reach_the_log(tree, tmp_path):
         assert all(frame.label_png is not None for frame in log.frames("left"))
 
 
+def test_logs_of_an_earlier_conversion_are_a_warning_in_the_splits_converted_now(tree, tmp_path, capsys):
+    logs = tmp_path / "logs"
+    other = Tree(tmp_path / "other", city="bonn")
+    tree.write(range(2))
+    other.write(range(2))
+    Tree(other.root, split="train").write(range(2))
+    for source, split in ((tree, "val"), (other, "train")):
+        assert run("convert", "cityscapes", source.root, logs, "--split", split) == 0
+        assert "Warning" not in capsys.readouterr().err
+    assert run("convert", "cityscapes", other.root, logs, "--split", "val") == 0
+    stray = logs / "val" / "aachen_000000_000000.mcap"
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last == f"Warning: {logs} holds 1 logs that do not belong to this conversion, such as {stray}"
+
+
+def test_when_every_recording_fails_there_is_no_other_error(tree, tmp_path, capsys):
+    (name,) = tree.write([0])
+    tree.disparity(name).unlink()
+    assert run("convert", "cityscapes", tree.root, tmp_path / "logs") == 1
+    assert capsys.readouterr().err.endswith("logs: 0 written, 0 up to date, 1 failed\n")
+
+
 def test_labels_of_the_other_kind_are_one_line_without_traceback(tree, tmp_path, capsys):
     labelled(tree, tmp_path / "labels", kind="LabelTrainIds", highest=18)
     assert run("convert", "cityscapes", tree.root, tmp_path / "logs", "--labels", tmp_path / "labels") == 1

@@ -61,7 +61,7 @@ def published(out):
     return " ".join(fingerprint(out / f"{label}.mcap")[:8] for label in LABELS)
 
 
-def test_the_example_writes_logs_and_a_second_run_keeps_them(tmp_path, monkeypatch):
+def test_the_example_writes_logs_and_a_second_run_keeps_them_and_warns_of_others(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _, *arguments = shlex.split(synthetic.epilog.removeprefix("Example: "))
     done = CliRunner().invoke(cli, arguments)
@@ -73,9 +73,16 @@ def test_the_example_writes_logs_and_a_second_run_keeps_them(tmp_path, monkeypat
         assert log.scene.dataset == "synthetic"
         assert sum(1 for _ in log.frames("front")) == 30
         assert len(list(log.poses())) == 30
+    assert "Warning" not in done.output
     before = [log.stat().st_mtime_ns for log in logs]
+    for split in ("val", "test"):
+        (tmp_path / "logs" / split).mkdir(exist_ok=True)
+        shutil.copy(logs[0], tmp_path / "logs" / split / "another.mcap")
     again = CliRunner().invoke(cli, arguments)
-    assert "0 written, 2 up to date, 0 failed" in again.output
+    assert again.output.endswith(
+        "logs: 0 written, 2 up to date, 0 failed\n"
+        "Warning: logs holds 1 logs that do not belong to this conversion, such as logs/val/another.mcap\n"
+    )
     assert [log.stat().st_mtime_ns for log in logs] == before
 
 
