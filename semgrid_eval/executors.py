@@ -42,6 +42,10 @@ class Executor(Protocol):
     def parallel(self) -> int:
         """How many items are worked on at once."""
 
+    @property
+    def threads(self) -> int | None:
+        """How many threads numeric libraries have for each item; None means as many as in the calling process."""
+
     def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
         """Yield (index of the item, result) as results come; function, items and results must be picklable.
 
@@ -54,6 +58,7 @@ class InProcess:
     """Works in this process, in order."""
 
     parallel = 1
+    threads = None
 
     def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
         """Yield results in the order of the items."""
@@ -75,7 +80,7 @@ class Processes:
 
     def __init__(self, workers: int, *, threads: int | None = None, gpus: Sequence[str] = ()) -> None:
         self.parallel = workers
-        self._threads = threads or max(1, available_cores() // workers)
+        self.threads = threads or max(1, available_cores() // workers)
         self._gpus = tuple(gpus)
 
     def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
@@ -107,7 +112,7 @@ class Processes:
             min(self.parallel, len(chosen)),
             mp_context=_CONTEXT,
             initializer=_start_worker,
-            initargs=(self._threads, self._gpus, _CONTEXT.Value("i", 0), begun),
+            initargs=(self.threads, self._gpus, _CONTEXT.Value("i", 0), begun),
         )
         try:
             futures: dict[Future[R], int] = {}
@@ -137,6 +142,11 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def thread_variables(threads: int) -> dict[str, str]:
+    """Return what the environment of a new process must hold for its numeric libraries to have that many threads."""
+    return dict.fromkeys(_THREAD_VARIABLES, str(threads))
+
+
 _begun: "Array[c_byte] | None" = None  # in a worker: marks the items whose turn has come
 
 
@@ -145,8 +155,7 @@ def _start_worker(threads: int, gpus: tuple[str, ...], started: "Synchronized[in
     _begun = begun
     # Ctrl-C stops the parent alone: it drops what waits, and what is being written is finished.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for name in _THREAD_VARIABLES:
-        os.environ[name] = str(threads)
+    os.environ.update(thread_variables(threads))
     with started.get_lock():
         number, started.value = started.value, started.value + 1
     if gpus:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from semgrid_eval.errors import InputError, MissingExtraError
-from semgrid_eval.executors import NoRoomError, WorkerDied
+from semgrid_eval.executors import NoRoomError, WorkerDied, thread_variables
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -24,7 +24,7 @@ class RayExecutor:
 
     Args:
         address: of a running cluster (`auto` finds the one of this machine), or `local` to start one here.
-        cpus: cores for each piece of work.
+        cpus: cores for each piece of work; its numeric libraries have as many threads, and one at least.
         gpus: GPUs for each piece of work; a fraction lets several share one.
         local_cpus: cores of a cluster that is started here; all of them if not given.
 
@@ -50,9 +50,16 @@ class RayExecutor:
         """How many pieces of work fit on the cluster at once, at least 2: they never run in this process."""
         return max(2, int(self._ray.cluster_resources().get("CPU", 1.0) / max(self._cpus, 0.01)))
 
+    @property
+    def threads(self) -> int:
+        """How many threads numeric libraries have for each piece of work, whatever the machine it runs on says."""
+        return max(1, int(self._cpus))
+
     def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
         """Yield (index of the item, result) as results come; leaving early cancels what has not begun."""
-        remote = self._ray.remote(num_cpus=self._cpus, num_gpus=self._gpus, max_retries=1)(_apply)
+        environment = {"env_vars": thread_variables(self.threads)}
+        options = {"num_cpus": self._cpus, "num_gpus": self._gpus, "max_retries": 1, "runtime_env": environment}
+        remote = self._ray.remote(**options)(_apply)
         pending = {remote.remote(function, item, str(Path.cwd())): index for index, item in enumerate(items)}
         try:
             while pending:
