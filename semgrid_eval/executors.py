@@ -6,6 +6,7 @@ Whatever has the form of `Executor` can take the place of these two, for example
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -153,6 +154,7 @@ _begun: "Array[c_byte] | None" = None  # in a worker: marks the items whose turn
 def _start_worker(threads: int, gpus: tuple[str, ...], started: "Synchronized[int]", begun: "Array[c_byte]") -> None:
     global _begun  # shared memory reaches a process only when it starts
     _begun = begun
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     # Ctrl-C stops the parent alone: it drops what waits, and what is being written is finished.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ.update(thread_variables(threads))
@@ -160,6 +162,14 @@ def _start_worker(threads: int, gpus: tuple[str, ...], started: "Synchronized[in
         number, started.value = started.value, started.value + 1
     if gpus:
         os.environ["CUDA_VISIBLE_DEVICES"] = gpus[number % len(gpus)]
+
+
+def _end_with_parent() -> None:
+    """Leave at once when the parent has ended, however it did: nobody is there to take a result."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _begin(function: Callable[[T], R], item: T, index: int) -> R:

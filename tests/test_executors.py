@@ -1,11 +1,24 @@
 import os
+import signal
+import subprocess
+import sys
 import time
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 
+import pytest
 from support.pieces import environment, fit_alone, square_or_die
 
 from semgrid_eval.executors import InProcess, Processes, WorkerDied, available_cores, local_executor, thread_variables
+
+BUSY_PARENT = """
+from semgrid_eval.executors import Processes
+from support.pieces import last_a_minute
+
+for _ in Processes(2).run(last_a_minute, range(6)):
+    pass
+"""
 
 
 def work_a_while_or_die(value):
@@ -24,6 +37,21 @@ def gpu_when_all_have_begun(folder, expected, _item):
     while len(list(folder.iterdir())) < expected and time.monotonic() < end_s:
         time.sleep(0.05)
     return os.getpid(), os.environ.get("CUDA_VISIBLE_DEVICES")
+
+
+@pytest.fixture
+def busy_parent():
+    """Give a process whose two workers have begun; its standard output ends when the last of the three ends."""
+    here = Path(__file__).parent
+    parent = subprocess.Popen(
+        [sys.executable, "-c", BUSY_PARENT], cwd=here, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        assert [parent.stdout.readline() for _ in range(2)] == ["begun\n"] * 2
+        yield parent
+    finally:
+        parent.kill()
+        parent.communicate()
 
 
 def test_one_worker_means_this_process():
@@ -50,6 +78,12 @@ def test_what_a_killed_process_had_not_begun_goes_on_together():
     times = sorted(results.values())
     assert len(times) == 6
     assert any(later < end for (_, end), (later, _) in pairwise(times))
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_processes_end_with_a_parent_that_is_killed(busy_parent, number):
+    busy_parent.send_signal(number)
+    assert busy_parent.communicate(timeout=30)[0] == ""
 
 
 def test_numeric_libraries_have_the_threads_that_an_executor_names():

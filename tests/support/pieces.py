@@ -1,6 +1,7 @@
 """Pieces of work for executors, in a module that other processes can import."""
 
 import os
+import time
 
 from semgrid_eval.executors import NoRoomError
 
@@ -21,3 +22,9 @@ def fit_alone(folder, item):
 
 def environment(_item):
     return dict(os.environ)
+
+
+def last_a_minute(_item):
+    """Tell on the standard output that this has begun, and go on for longer than a test waits."""
+    os.write(1, b"begun\n")
+    time.sleep(60)
