@@ -1,7 +1,11 @@
 """The `semgrid-eval` command and the one place where errors become exit codes."""
 
 import importlib
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import click
@@ -20,6 +24,8 @@ _COMMANDS = {
     "demo": "semgrid_eval.cli.demo",
     "bench": "semgrid_eval.cli.bench",
 }
+_GO_ON = ("convert", "segment", "grids", "run", "demo")
+"""Commands that keep what is done, so that after a stop they need not begin again."""
 
 
 class _LazyGroup(click.Group):
@@ -35,6 +41,13 @@ class _LazyGroup(click.Group):
         assert isinstance(command, click.Command)
         return command
 
+    def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 - whatever a command returns
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            what_next = "; the same command goes on from here" if ctx.invoked_subcommand in _GO_ON else ""
+            raise click.Abort(what_next) from error
+
 
 @click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="semgrid-eval")
@@ -45,17 +58,32 @@ def cli() -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; a user's mistake ends it with one line and exit code 1 or 2."""
     try:
-        result: Any = cli.main(args=arguments, standalone_mode=False)
+        with _terminable():
+            result: Any = cli.main(args=arguments, standalone_mode=False)
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
     except SemgridError as error:
         click.echo(f"Error: {error}", err=True)
         sys.exit(1)
-    except (KeyboardInterrupt, click.Abort):
-        click.echo("Stopped; the same command goes on from here.", err=True)
+    except (KeyboardInterrupt, click.Abort) as stop:
+        click.echo(f"\nStopped{stop}.", err=True)  # the terminal shows ^C in the line before
         sys.exit(130)
     sys.exit(result if isinstance(result, int) else 0)
+
+
+@contextmanager
+def _terminable() -> Iterator[None]:
+    """Let SIGTERM end the block as Ctrl-C does, so that temporary files are removed; a handler set before stays."""
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 if __name__ == "__main__":
