@@ -18,6 +18,9 @@ R = TypeVar("R")
 LOCAL = "local"
 CONNECTION_TIMEOUT_S = 5.0
 
+# Ray's errors where a worker, its machine or the result there is gone; the last is the base of several.
+_LOST = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError", "ObjectLostError")
+
 
 class RayExecutor:
     """Works on a Ray cluster; the folders of logs, grids and the run must be reachable from all its machines.
@@ -77,10 +80,10 @@ class RayExecutor:
     def _result(self, reference: Any) -> Any:  # noqa: ANN401 - Ray is untyped
         try:
             return self._ray.get(reference)
-        except (self._ray.exceptions.WorkerCrashedError, self._ray.exceptions.OutOfMemoryError) as error:
-            return WorkerDied(str(error).splitlines()[0])
         except NoRoomError as error:
             return WorkerDied(str(error.cause))  # type: ignore[attr-defined] # Ray's copy has the original as its cause
+        except tuple(getattr(self._ray.exceptions, name) for name in _LOST) as error:
+            return WorkerDied(str(error).partition("\n")[0])
 
     def _connect(self, address: str, local_cpus: int | None) -> None:
         options: dict[str, Any] = {"num_cpus": local_cpus} if address == LOCAL else {"address": address}

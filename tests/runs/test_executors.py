@@ -32,6 +32,35 @@ def test_a_ray_cluster_names_what_has_no_room(cluster, tmp_path):
     assert dict(cluster.run(partial(fit_alone, tmp_path), ["never"])) == {0: WorkerDied("out of memory")}
 
 
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (ray.exceptions.WorkerCrashedError(), "The worker died unexpectedly"),
+        (ray.exceptions.OutOfMemoryError("Task was killed\ndue to the node running low on memory"), "Task was killed"),
+        (ray.exceptions.LocalRayletDiedError(), "The task's local raylet died"),
+        (ray.exceptions.NodeDiedError("Task failed because its node died"), "Task failed because its node died"),
+        (ray.exceptions.ObjectLostError("c8ef", None, ""), "Failed to retrieve object c8ef"),
+        (ray.exceptions.OwnerDiedError("c8ef", None, ""), "Failed to retrieve object c8ef"),
+        (ray.exceptions.ObjectReconstructionFailedError("c8ef"), "Failed to retrieve object c8ef"),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, Exception) else None,
+)
+def test_a_lost_machine_is_named_and_takes_nobody_elses_work_with_it(cluster, monkeypatch, error, reason):
+    get, lost = ray.get, []
+
+    def get_all_but_the_first(reference):
+        if not lost:
+            lost.append(reference)
+            raise error
+        return get(reference)
+
+    monkeypatch.setattr(ray, "get", get_all_but_the_first)
+    results = list(dict(cluster.run(square_or_die, [1, 1])).values())
+    (died,) = (result for result in results if isinstance(result, WorkerDied))
+    assert died.reason.startswith(reason)
+    assert next(result[0] for result in results if result is not died) == 1
+
+
 def test_numeric_libraries_have_the_threads_that_a_ray_executor_names(cluster):
     from semgrid_eval.runs.executors import RayExecutor
 
