@@ -67,6 +67,8 @@ def write_playback(
 ) -> Playback:
     """Write the windows of a row as an MCAP log, and a layout for Foxglove and Lichtblick beside it.
 
+    Inputs are moved to the target's time, also those of a row that saw them not moved.
+
     Args:
         run: folder of the run.
         row_name: the row, which has to have predictions.

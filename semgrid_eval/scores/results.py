@@ -186,7 +186,7 @@ def is_done(folder: Path, *, with_predictions: bool = False, with_history: bool 
 
 
 def read_windows(run: Path, windows_id: str) -> dict[str, NDArray[Any]]:
-    """Read what predictors saw and were scored on: `inputs`, `target` and `mask`.
+    """Read `inputs` (moved to the target's time, also for rows that saw them not moved), `target` and `mask`.
 
     Raises:
         ResultError: they are missing or damaged.

@@ -16,8 +16,9 @@ def workplace(tmp_path_factory):
     """A folder with logs and a run."""
     folder = tmp_path_factory.mktemp("play")
     write_log(street(0, frames=9).recording("toy"), folder / "logs" / "val" / "toy.mcap")
-    rows = [{"name": "BL-DC", "model": "newest", "window": {"step_frames": 3, "target_frame": 8}}]
-    (folder / "m.yaml").write_text(yaml.safe_dump({"rows": rows}))
+    rows = [{"name": "BL-DC", "model": "newest"}, {"name": "BL-NT", "model": "newest", "translate": False}]
+    defaults = {"window": {"step_frames": 3, "target_frame": 8}}
+    (folder / "m.yaml").write_text(yaml.safe_dump({"defaults": defaults, "rows": rows}))
     call("run", str(folder / "m.yaml"), "--logs", str(folder / "logs"), "--out", str(folder / "runs" / "first"))
     return folder
 
@@ -46,10 +47,22 @@ def test_example_of_play_writes_a_log_and_a_layout(here):
     assert {"/grid/target", "/grid/prediction/BL-DC", "/camera/front/image", "/tf"} <= topics
 
 
+def test_inputs_are_moved_for_a_row_without_translation_too_as_the_help_says(here):
+    assert "also those of a row without translation" in " ".join(call("play", "--help").stdout.split())
+    played = {}
+    for row in ("BL-DC", "BL-NT"):
+        call("play", "runs/first", row, "--out", f"{row}.mcap", "--logs", "logs")
+        with Path(f"{row}.mcap").open("rb") as stream:
+            found = make_reader(stream).iter_messages(["/grid/input/full/exact", f"/grid/prediction/{row}/exact"])
+            played[row] = {channel.topic.rsplit("/", 2)[1]: message.data for _, channel, message in found}
+    assert played["BL-NT"]["full"] == played["BL-DC"]["full"] == played["BL-DC"]["BL-DC"]
+    assert played["BL-NT"]["BL-NT"] != played["BL-NT"]["full"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["runs/first", "BL-NT"], 1, "Error: runs/first: there is no row 'BL-NT', only BL-DC"),
+        (["runs/first", "BL-Sp"], 1, "Error: runs/first: there is no row 'BL-Sp', only BL-DC, BL-NT"),
         (["nowhere", "BL-DC"], 1, "Error: nowhere: no run lies here"),
         (["runs/first", "BL-DC", "--all", "--recording", "toy"], 2, "--recording names one recording"),
     ],
