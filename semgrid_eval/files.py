@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import secrets
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -11,6 +12,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from semgrid_eval.errors import InputError
+
+try:
+    import fcntl
+except ImportError:  # Windows: nobody waits for anybody
+    fcntl = None  # type: ignore[assignment]
 
 DIGEST_CHARACTERS = 16
 _BLOCK_BYTES = 1 << 20
@@ -36,6 +42,24 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
     finally:
         with suppress(OSError):  # it is gone after success, and its folder may never have been one
             partial.unlink()
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Let one process at a time into the block for a folder, which is made if need be; a lock ends with its process.
+
+    Raises:
+        InputError: the folder cannot be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        stream = (folder / ".lock").open("ab")
+    except OSError as error:
+        raise InputError(f"cannot be written: {_reason(error)}", path=folder) from error
+    with stream:
+        if fcntl is not None:
+            fcntl.flock(stream, fcntl.LOCK_EX)
+        yield
 
 
 @contextmanager
@@ -118,4 +142,4 @@ def _reason(error: OSError) -> str:
 
 
 def _partial_name(path: Path) -> Path:
-    return path.with_name(f".{path.name}.{os.getpid()}.part")
+    return path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")

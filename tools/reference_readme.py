@@ -57,7 +57,7 @@ def facts(record: RunRecord, done: list[ResultRecord]) -> dict[str, str]:
         "data set": ", ".join(data_sets(record)),
         "rows": f"{len(record.rows)}" + (f", failed: {', '.join(failed)}" if failed else ""),
         "trainings": f"{len(trained)}, {sum(trained) / 60:.0f} minutes in all",
-        "started": record.started,
+        "last start": record.started,
         "machine": ", ".join(f"{name} {value}" for name, value in sorted(record.machine.items())),
         "versions": ", ".join(f"{name} {version}" for name, version in sorted(record.versions.items())),
     }

@@ -53,7 +53,12 @@ def measure(
 
 def conditions(device: torch.device) -> dict[str, str]:
     """Return what the numbers hold for: processor, cores, threads, device, other work at this moment and versions."""
-    return {"processor": _processor(), "load": f"{load():.1f}", **machine(device), **versions()}
+    return {
+        "processor": _processor(),
+        "load": f"{load():.1f}",
+        **machine(device, torch.get_num_threads()),
+        **versions(),
+    }
 
 
 def load() -> float:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
 )
 @click.option(
     "--trainings",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=click.Path(path_type=Path, file_okay=False, exists=True),
     help="Trained networks (default: OUT/trainings); those of another run are used where they fit.",
 )
 @click.option(

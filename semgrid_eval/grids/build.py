@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -79,19 +79,21 @@ def build_grids(
     folder: Path,
     config: GridConfig,
     *,
+    sensors: Sequence[str] | None = None,
     executor: Executor | None = None,
     progress: Progress = silent,
 ) -> GridDataSet:
     """Make the grids of all logs, or take those that lie in `folder` already, as many at once as `executor` works on.
 
-    A log that fails is noted with its reason and the others go on. The order of recordings is that of `logs`.
+    A log that fails is noted with its reason and the others go on. The order of recordings is that of `logs`. Grids of
+    all sensors are made; with `sensors`, only those of these are read into memory.
     """
     data = GridDataSet()
     ready: dict[Path, list[GridRecording]] = {}
     missing: list[Path] = []
     for log in logs:
         try:
-            ready[log] = _read(_cache_file(log, folder, config), log)
+            ready[log] = _only(_read(_cache_file(log, folder, config), log), sensors)
         except ResultError:
             missing.append(log)  # not made yet, or damaged
         except SemgridError as error:
@@ -105,10 +107,18 @@ def build_grids(
             data.failed[str(log)] = failure.reason if isinstance(failure, WorkerDied) else failure
             continue
         # Workers leave their grids on disk: reading them costs less than sending them between processes.
-        ready[log] = _read(_cache_file(log, folder, config), log)
+        ready[log] = _only(_read(_cache_file(log, folder, config), log), sensors)
         data.built += 1
     data.recordings = [recording for log in logs for recording in ready.get(log, [])]
     return data
+
+
+def _only(recordings: list[GridRecording], sensors: Sequence[str] | None) -> list[GridRecording]:
+    if sensors is None:
+        return recordings
+    kept = tuple(name for name in recordings[0].sensors if name in sensors)
+    rows = [recordings[0].sensors.index(name) for name in kept]
+    return [replace(recording, sensors=kept, grids=recording.grids[rows]) for recording in recordings]
 
 
 def build_log(log: Path, config: GridConfig) -> list[GridRecording]:

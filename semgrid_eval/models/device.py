@@ -25,9 +25,12 @@ _MALLOPT = {-4: 0, -1: 2**31 - 1, -2: 256 << 20}  # M_MMAP_MAX, M_TRIM_THRESHOLD
 def choose_device(name: str = "auto") -> torch.device:
     """Turn `auto` (CUDA where there is one, else CPU), `cpu`, `cuda`, `cuda:1` ... into a device.
 
+    CUDA's convolutions are set to repeat their sums in the same order, and float32 to be no less.
+
     Raises:
         ConfigError: there is no such device here.
     """
+    torch.backends.cudnn.deterministic, torch.backends.cudnn.allow_tf32 = True, False
     if name == "auto":
         return torch.device("cuda" if torch.cuda.is_available() else "cpu")
     try:
@@ -82,6 +85,17 @@ def keep_freed_memory() -> None:
         return
     for parameter, value in _MALLOPT.items():
         mallopt(parameter, value)
+
+
+@contextmanager
+def torch_threads(count: int) -> Iterator[None]:
+    """Let torch use as many threads inside the block, and as many as before after it."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 @contextmanager

@@ -50,10 +50,11 @@ class CheckedPredictor:
         return scores
 
 
-def load_predictor(spec: str) -> Predictor:
+def load_predictor(spec: str, device: torch.device | None = None) -> Predictor:
     """Make the predictor that `path.py:Class` or the name of an entry point in `semgrid_eval.models` stands for.
 
-    The class is called without arguments. Its code runs with the rights of this process.
+    The class is called without arguments; a torch module is moved to the device, if one is given. The code runs with
+    the rights of this process.
 
     Raises:
         InputError: there is no such file, class or entry point, or making it failed.
@@ -67,7 +68,7 @@ def load_predictor(spec: str) -> Predictor:
     if not callable(predictor):
         raise InputError("gives an object that cannot be called", field=spec)
     if isinstance(predictor, torch.nn.Module):
-        predictor.eval()
+        predictor.eval().to(device)
     return CheckedPredictor(predictor, spec)
 
 
@@ -87,6 +88,8 @@ def _from_file(path: Path, name: str) -> Any:  # noqa: ANN401 - whatever the fil
     spec = importlib.util.spec_from_file_location(f"semgrid_eval_model_{path.stem}", path)
     if not path.is_file() or spec is None or spec.loader is None:
         raise InputError("is no Python file; a model is given as path.py:Class", path=path)
+    if (folder := str(path.resolve().parent)) not in sys.path:
+        sys.path.insert(0, folder)  # as if the file were run: it may import what lies beside it
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses and pickle look a class's module up by name
     try:

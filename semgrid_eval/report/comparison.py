@@ -14,8 +14,9 @@ DIFFERENCE_COLUMNS = ("static_known", "small_static", "vehicles", "small_dynamic
 
 @dataclass(frozen=True)
 class Headline:
-    """The best row of the main group and the rows it is measured against."""
+    """The best row of the main group of `compared` rows, and the rows it is measured against."""
 
+    compared: int
     best: Row
     rival: Row | None  # the best row of the other kind (baseline or not), else the runner-up
     reference: Row | None  # the baseline of the best row's own experiment
@@ -46,7 +47,7 @@ def headline(scores: Scores) -> Headline | None:
     others = [row for row in group if row.is_baseline != best.is_baseline]
     others = others or [row for row in group if row != best]
     rival = max(others, key=lambda row: scores[row.name].mean[HEADLINE], default=None)
-    return Headline(best, rival, reference_of(best, rows))
+    return Headline(len(group), best, rival, reference_of(best, rows))
 
 
 def verdict(difference: Estimate) -> str:
@@ -68,8 +69,9 @@ def _nearness(row: Row, other: Row) -> tuple[bool, ...]:
 
 
 def _main_group(rows: Sequence[Row]) -> list[Row]:
-    """Take the rows of one run, horizon and set of sensors: those of experiment DC, else the largest such group."""
+    """Take the rows of one run, horizon and set of inputs: those of experiment DC, else the largest such group."""
     groups: dict[tuple[object, ...], list[Row]] = {}
     for row in rows:
-        groups.setdefault((row.run, row.record.horizon_steps, row.record.sensors), []).append(row)
+        key = (row.run, row.record.horizon_steps, row.record.sensors, row.record.inputs)
+        groups.setdefault(key, []).append(row)
     return max(groups.values(), key=lambda group: (any(row.record.experiment == "DC" for row in group), len(group)))

@@ -13,7 +13,7 @@ from semgrid_eval.report.cells import Cell, Line, Table, plural
 from semgrid_eval.report.commands import row_command
 from semgrid_eval.report.reading import Row, Run
 from semgrid_eval.report.scaling import scaling
-from semgrid_eval.scores.results import LogRecord, RunRecord
+from semgrid_eval.scores.results import NOT_RUN, LogRecord, RunRecord
 
 WINDOW_COLUMNS = ("window_set", "recording", "log", "target_frame", "target_stamp_ns", "input_stamps_ns")
 
@@ -52,8 +52,8 @@ def facts(run: Run, runs: Sequence[Run]) -> Facts:
     entries = [
         ("Title", record.title),
         ("Command", record.command),
-        ("Started", record.started),
-        ("Duration", duration(record.seconds)),
+        ("Last start", record.started),
+        ("Duration of the last start", duration(record.seconds)),
         *(("Data", text) for text in data_sets(record)),
         *((f"Version of {name}", version) for name, version in sorted(record.versions.items())),
         *((f"Machine: {name.replace('_', ' ')}", value) for name, value in sorted(record.machine.items())),
@@ -125,6 +125,8 @@ def window_frame(runs: Sequence[Run]) -> pd.DataFrame:
 
 
 def _state(row: Row) -> str:
+    if row.is_left:
+        return NOT_RUN
     if not row.results:
         return "failed"
     trained = row.results[0].record.seed is not None

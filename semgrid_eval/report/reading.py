@@ -16,6 +16,7 @@ from semgrid_eval.errors import ConfigError, SemgridError
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores.results import (
+    NOT_RUN,
     PREDICTIONS_FILE,
     ResultRecord,
     RowRecord,
@@ -83,6 +84,11 @@ class Row:
     results: tuple[Result, ...]
     failures: tuple[str, ...]
     run: Path
+
+    @property
+    def is_left(self) -> bool:
+        """Whether its turn has not come, or it was not asked for."""
+        return not self.results and not self.failures
 
     @property
     def is_baseline(self) -> bool:
@@ -164,7 +170,7 @@ def _tags(folders: Sequence[Path]) -> list[str]:
 
 
 def _load_row(run: Path, row: RowRecord, name: str) -> Row:
-    failures = [] if row.failure is None else [row.failure]
+    failures = [] if row.failure in (None, NOT_RUN) else [row.failure]
     found = []
     for result_id in row.results:
         try:

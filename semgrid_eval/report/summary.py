@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 
 from semgrid_eval.report.cells import interval, interval_phrase, number, plural, signed
 from semgrid_eval.report.comparison import DIFFERENCE_COLUMNS, HEADLINE, Headline, verdict
@@ -50,7 +51,8 @@ def _which(scores: Scores, found: Headline | None) -> str:
     if found is None:
         return "No row has a score: nothing can be compared."
     best = scores[found.best.name]
-    start = f"{found.best.name} has the highest mean class IoU, {number(best.mean[HEADLINE])} without unknown"
+    among = "" if found.compared == len(scores) else f"Of {found.compared} rows with the same inputs and horizon, "
+    start = f"{among}{found.best.name} has the highest mean class IoU, {number(best.mean[HEADLINE])} without unknown"
     if found.rival is None:
         return f"{start} ({interval_phrase(best.estimate(HEADLINE))}); there is no other row to compare with."
     lead = best.minus(scores[found.rival.name], HEADLINE)
@@ -66,10 +68,12 @@ def _against_reference(scores: Scores, found: Headline | None) -> str:
     groups: dict[str, list[str]] = {}
     for column in DIFFERENCE_COLUMNS[:-1]:
         difference = scores[model.name].minus(scores[other.name], column)
+        if not isfinite(difference.value):  # a class that is nowhere
+            continue
         text = f"{LABELS[column].lower()} ({signed(difference.value)})"
         groups.setdefault(verdict(difference), []).append(text)
     parts = [f"{_WORDS[word]} on {_listed(groups[word])}" for word in _WORDS if word in groups]
-    return f"Against {other.name}, {model.name} is {'; '.join(parts)}."
+    return f"Against {other.name}, {model.name} is {'; '.join(parts)}." if parts else ""
 
 
 def _evidence(runs: Sequence[Run], scores: Scores) -> str:
@@ -83,8 +87,10 @@ def _evidence(runs: Sequence[Run], scores: Scores) -> str:
         span = plural(max(seeds), "seed") if min(seeds) == max(seeds) else f"{min(seeds)} to {max(seeds)} seeds"
         text += f" and {span} for each trained row"
     failed = sum(bool(row.failures) for run in runs for row in run.rows)
-    text += f"; {plural(failed, 'row')} failed." if failed else "; no row failed."
-    return text + (_doubt(recordings, seeds))
+    text += f"; {plural(failed, 'row')} failed" if failed else "; no row failed"
+    if left := sum(row.is_left for run in runs for row in run.rows):
+        text += f", {left} {'was' if left == 1 else 'were'} not run yet"
+    return f"{text}.{_doubt(recordings, seeds)}"
 
 
 def _doubt(recordings: int, seeds: Sequence[int]) -> str:

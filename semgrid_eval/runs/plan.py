@@ -5,9 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from semgrid_eval.errors import InputError, SemgridError
+import torch
+
+from semgrid_eval.errors import InputError, SemgridError, first_line
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.checkpoint import HISTORY_FILE, read_history
+from semgrid_eval.models.device import torch_threads
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.runs.matrix import Matrix, Row
@@ -50,10 +53,10 @@ def plan_run(
     Raises:
         InputError: there is no log at all, or the device does not exist.
     """
+    wanted = wanted_keys(matrix, options.only)
     worker = make_worker(matrix, logs, out, options, stage)
     for sources in worker.sources:
         sources.prepare()
-    wanted = wanted_keys(matrix, options.only)
     units = {key: unit for key, unit in plan_units(matrix).items() if key in wanted}
     sharing: dict[str, list[str]] = {key: [] for key in units}
     for row in matrix.rows:
@@ -79,15 +82,15 @@ def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], speed: "_Speed
     """Plan one unit; `priced` collects the trainings that are counted already, which the unit may share."""
     try:
         job = worker.look(unit.row, unit.seed)
-    except SemgridError as error:
-        return PlannedUnit(rows, unit.seed, 0, 0, 0, 0.0, done=False, failure=str(error))
-    done = worker.is_done(job)
-    if done or job.training is None or job.training.id in priced:
-        return PlannedUnit(rows, unit.seed, len(job.scored), 0, 0, 0.0, done)
+        done = worker.is_done(job)
+        if done or job.training is None or job.training.id in priced:
+            return PlannedUnit(rows, unit.seed, len(job.scored), 0, 0, 0.0, done)
+        made = _epochs_made(job.training)
+        updates = _updates_left(unit.row, made)
+        seconds = speed.seconds(unit.row, job.training, made) if updates else 0.0
+    except (SemgridError, torch.OutOfMemoryError, MemoryError) as error:
+        return PlannedUnit(rows, unit.seed, 0, 0, 0, 0.0, done=False, failure=first_line(error))
     priced.add(job.training.id)
-    made = _epochs_made(job.training)
-    updates = _updates_left(unit.row, made)
-    seconds = speed.seconds(unit.row, job.training, made) if updates else 0.0
     return PlannedUnit(rows, unit.seed, len(job.scored), updates, updates * unit.row.training.batch, seconds, done)
 
 
@@ -113,7 +116,13 @@ class _Speed:
     def seconds(self, row: Row, training: Training, epochs_made: int) -> float:
         """Estimate the rest of a training with its validation after each epoch."""
         shape = digest_value(
-            [row.network.model_dump(), row.training.batch, row.training.precision, training.windows.grids_per_window]
+            [
+                row.network.model_dump(),
+                row.training.batch,
+                row.training.precision,
+                training.windows.grids_per_window,
+                list(training.windows.data.grids.shape[-2:]),
+            ]
         )
         if shape not in self._seconds_by_shape:
             self._seconds_by_shape[shape] = self._measure(row, training)
@@ -125,7 +134,7 @@ class _Speed:
         short = row.training.model_copy(
             update={"epochs": CALIBRATION_EPOCHS, "updates_per_epoch": CALIBRATION_UPDATES, "epoch_unit": "batches"}
         )
-        with tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory() as folder, torch_threads(self._worker.threads):
             path = Path(folder) / "sample"
             trained = train(training.windows, row.network, short, seed=0, device=self._worker.device, folder=path)
         return min(epoch.seconds for epoch in trained.history) / CALIBRATION_UPDATES

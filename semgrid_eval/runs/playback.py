@@ -26,6 +26,7 @@ from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.runs.viewer_layout import prediction_topic, viewer_layout
 from semgrid_eval.scores.results import (
+    NOT_RUN,
     PREDICTIONS_FILE,
     ResultRecord,
     RowRecord,
@@ -138,7 +139,7 @@ def _row(record: RunRecord, name: str, run: Path) -> RowRecord:
     if row is None:
         raise InputError(f"there is no row {name!r}, only {_listed([row.name for row in record.rows])}", path=run)
     if not row.results:
-        raise InputError(f"it has no result: {row.failure or 'not run yet'}", path=run, field=f"row {name}")
+        raise InputError(f"it has no result: {row.failure or NOT_RUN}", path=run, field=f"row {name}")
     return row
 
 

@@ -32,12 +32,12 @@ def versions() -> dict[str, str]:
     return found | installed_versions(_PACKAGES)
 
 
-def machine(device: torch.device) -> dict[str, str]:
-    """Describe the machine, without its name."""
+def machine(device: torch.device, threads: int) -> dict[str, str]:
+    """Describe the machine, without its name, and the threads of each process that trains."""
     described = {
         "system": f"{platform.system()} {platform.machine()}",
         "cpu_cores": str(os.cpu_count()),
-        "torch_threads": str(torch.get_num_threads()),
+        "torch_threads": str(threads),
         "device": str(device),
     }
     if device.type == "cuda":

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import torch
 
-from semgrid_eval.errors import ConfigError, SemgridError
+from semgrid_eval.errors import ConfigError, SemgridError, first_line
 from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.device import choose_device, keep_freed_memory
@@ -87,19 +87,25 @@ def run_matrix(
         ConfigError: `options.only` asks for a row that the matrix does not have.
     """
     started = _Clock()
+    units = plan_units(matrix)
+    wanted = wanted_keys(matrix, options.only)
     worker = make_worker(matrix, logs, out, options, stage)
     for sources in worker.sources:
         sources.prepare()
-    units = plan_units(matrix)
-    wanted = wanted_keys(matrix, options.only)
-    outcomes = {key: found for key in units if key not in wanted and (found := _finished(worker, units[key]))}
+    outcomes: dict[str, Outcome] = {}
+
+    def look_for_others() -> None:
+        for key, unit in units.items():
+            if key not in outcomes and key not in wanted and (found := _finished(worker, unit)):
+                outcomes[key] = found
 
     def keep_record() -> results.RunRecord:
         record = _record(matrix, options.command, started, worker, outcomes)
         results.write_run(out, record)  # a run that is stopped can be reported as far as it came
         return record
 
-    record = keep_record()
+    look_for_others()
+    keep_record()
     if options.pictures:
         rows = wanted_rows(matrix, options.only)
         keep_pictures(out, _scored_windows(worker, rows), options.grid_executor, stage)
@@ -108,9 +114,10 @@ def run_matrix(
         progress(0, len(keys))
         for done, (index, outcome) in enumerate(options.executor.run(work, [units[key] for key in keys]), start=1):
             outcomes[keys[index]] = Outcome(None, outcome.reason, {}) if isinstance(outcome, WorkerDied) else outcome
-            record = keep_record()
+            keep_record()
             progress(done, len(keys))
-    return record
+    look_for_others()  # another run may have worked on the same folder
+    return keep_record()
 
 
 def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[WindowSet, str | None]]:
@@ -134,7 +141,16 @@ def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stag
         Sources, cache=options.grids, rows=matrix.rows, executor=options.grid_executor, device=place, stage=stage
     )
     scored = source(options.validation_logs) if options.validation_logs else None
-    return Worker(out, source(logs), device, matrix.seed, stage, scored_sources=scored, trainings=options.trainings)
+    return Worker(
+        out,
+        source(logs),
+        device,
+        matrix.seed,
+        stage,
+        scored_sources=scored,
+        trainings=options.trainings,
+        threads=options.executor.threads,
+    )
 
 
 class _Clock:
@@ -235,7 +251,11 @@ def _attempt(worker: Worker, unit: Unit) -> Outcome:
     except SemgridError as error:
         return Outcome(None, str(error), {})
     except (torch.OutOfMemoryError, MemoryError) as error:
-        raise NoRoomError(f"out of memory: {str(error).partition(chr(10))[0]}") from error
+        raise NoRoomError(f"out of memory: {first_line(error)}") from error
+    except RuntimeError as error:  # what torch and its libraries raise; on a CPU, also where memory ends
+        if "allocate memory" in str(error):
+            raise NoRoomError(f"out of memory: {first_line(error)}") from error
+        return Outcome(None, f"{type(error).__name__}: {first_line(error)}", {})
     return Outcome(job.result_id, None, job.left_out)
 
 
@@ -260,7 +280,7 @@ def _record(
         command=command,
         matrix=matrix.model_dump(mode="json"),
         versions=versions(),
-        machine=machine(worker.device),
+        machine=machine(worker.device, worker.threads),
         started=started.utc,
         seconds=started.seconds(),
         logs=tuple(sorted(logs, key=lambda log: log.path)),  # under one path, the log to score comes last
@@ -293,5 +313,5 @@ def _row_record(row: Row, first_seed: int, outcomes: dict[str, Outcome]) -> resu
         sensors=row.sensors,
         translate=row.translate,
         results=tuple(found),
-        failure=failures[0] if failures else (None if done else "not run yet"),
+        failure=failures[0] if failures else (None if done else results.NOT_RUN),
     )

@@ -10,7 +10,7 @@ from semgrid_eval.executors import Executor
 from semgrid_eval.files import digest_value
 from semgrid_eval.frames.synthetic.published import published_fingerprints
 from semgrid_eval.grids.build import GridDataSet, build_grids
-from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
 from semgrid_eval.log.fingerprint import kept_fingerprints
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.progress import Stage
@@ -76,18 +76,27 @@ class Sources:
             data_set = self._grids(config)
             chosen = [recording for recording in data_set.recordings if recording.split == split]
             if not chosen:
-                found = ", ".join(sorted({recording.split for recording in data_set.recordings})) or "none"
+                found = ", ".join(sorted({record.split for record in self.records.values()})) or "none"
                 raise InputError(f"no recording of split {split!r} gave grids (splits found: {found})")
             sensors = list(dict.fromkeys(self._sensors[key[0]]))
             stacked = stack_recordings(chosen, cell_m=config.spec.cell_m, sensors=sensors)
             self._stacked[key] = stacked.to(self._device)
+            # They have their copy now.
+            data_set.recordings = [recording for recording in data_set.recordings if recording.split != split]
         return self._stacked[key]
 
     def _grids(self, config: GridConfig) -> GridDataSet:
         key = grid_digest(config)
         if key not in self._sets:
             with self._stage("grids") as progress:
-                data_set = build_grids(self._logs, self._cache, config, executor=self._executor, progress=progress)
+                data_set = build_grids(
+                    self._logs,
+                    self._cache,
+                    config,
+                    sensors=[*self._sensors[key], TARGET_SENSOR],
+                    executor=self._executor,
+                    progress=progress,
+                )
             self._sets[key] = data_set
             for log, reason in data_set.failed.items():
                 path = str(Path(log).relative_to(self._folder))

@@ -10,7 +10,8 @@ import torch
 from semgrid_eval.arrays import write_arrays
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
-from semgrid_eval.files import atomic_folder, digest_files, digest_value
+from semgrid_eval.files import atomic_folder, digest_files, digest_value, locked
+from semgrid_eval.grids.build import FORMAT_VERSION as GRIDS
 from semgrid_eval.models.baselines import FuseAll, OverlaySensors, RepeatNewest
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
 from semgrid_eval.models.device import choose_precision
@@ -27,6 +28,9 @@ from semgrid_eval.scores.evaluate import Evaluation, evaluate
 from semgrid_eval.sequences.dataset import WindowSet, select_windows, window_arrays
 from semgrid_eval.sequences.windows import WindowConfig, WindowPlan, training_windows, validation_windows
 
+SCORING_VERSION = 2
+"""Counts changes to how windows are kept and scored; results of another version are made anew."""
+
 WindowPlanner = Callable[[Sequence[int], WindowConfig], WindowPlan]
 
 
@@ -41,6 +45,7 @@ class Worker:
         stage: shows progress.
         scored_sources: the grids to score on, where they are others.
         trainings: folder of the trainings, where it is not the run's own.
+        threads: of numeric libraries where the units are worked on, which may be another process.
     """
 
     def __init__(
@@ -53,7 +58,9 @@ class Worker:
         *,
         scored_sources: Sources | None = None,
         trainings: Path | None = None,
+        threads: int | None = None,
     ) -> None:
+        self.threads = threads or torch.get_num_threads()
         self._out, self.device, self._stage, self._example_seed = out, device, stage, example_seed
         self._sources, self._scored_sources = sources, scored_sources or sources
         self._trainings = trainings or out / "trainings"
@@ -72,12 +79,12 @@ class Worker:
             SemgridError: the row cannot be run; the message says why.
         """
         scored, left_out = self.scored_windows(row)
-        windows_id = digest_value([scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
+        windows_id = digest_value([SCORING_VERSION, GRIDS, scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
         training = self._training(row, seed, self._watched(row, scored)) if seed is not None else None
         counted = self._training_windows(row) if row.model == "table" else None
         config = _config(row)
         learned_from = training.id if training else counted.digest() if counted is not None else None
-        result_id = digest_value([results.FORMAT_VERSION, config, windows_id, learned_from])
+        result_id = digest_value([results.FORMAT_VERSION, SCORING_VERSION, config, windows_id, learned_from])
         return Job(result_id, config, scored, windows_id, training, counted, left_out)
 
     def scored_windows(self, row: Row) -> tuple[WindowSet, dict[str, str]]:
@@ -99,10 +106,11 @@ class Worker:
         job = self.look(row, seed)
         folder = results.result_folder(self._out, job.result_id)
         self._keep_windows(job.scored, job.windows_id)
-        if self.is_done(job):
+        # A model of one's own is scored each time: nobody knows all files that its numbers depend on.
+        if row.built_in and self.is_done(job):
             return job
         trained = self._train(job.training, row) if job.training else None
-        predictor = _predictor(row, trained, job.counted)
+        predictor = _predictor(row, trained, job.counted, self.device)
         with self._stage(f"score {row.name}") as progress:
             evaluation = evaluate(predictor, job.scored, mask_mode=row.mask_mode, progress=progress)
         record = results.ResultRecord(
@@ -160,6 +168,7 @@ class Worker:
 
     def _training(self, row: Row, seed: int, watched: WindowSet | None) -> "Training":
         windows = self._training_windows(row)
+        # Whoever changes what a training makes of the same settings and logs adds a version here.
         training_id = digest_value(
             {
                 "network": row.network.model_dump(),
@@ -167,7 +176,7 @@ class Worker:
                 "precision": str(choose_precision(row.training.precision, self.device)),
                 "device": self.device.type,
                 # Sums on a CPU are rounded by how many threads share them.
-                "threads": torch.get_num_threads() if self.device.type == "cpu" else None,
+                "threads": self.threads if self.device.type == "cpu" else None,
                 "seed": seed,
                 "windows": [windows.digest(), watched.digest() if watched else None, grid_digest(row.grid)],
             }
@@ -175,7 +184,8 @@ class Worker:
         return Training(training_id, self._trainings / training_id, seed, windows, watched)
 
     def _train(self, job: "Training", row: Row) -> Trained:
-        with self._stage(f"train {row.name} (seed {job.seed})") as progress:
+        # Whoever else trains the same waits here, and then finds it done.
+        with locked(job.folder), self._stage(f"train {row.name} (seed {job.seed})") as progress:
             return train(
                 job.windows,
                 row.network,
@@ -246,7 +256,7 @@ def _config(row: Row) -> dict[str, object]:
     return {**identity(row), "code": code}
 
 
-def _predictor(row: Row, trained: Trained | None, counted: WindowSet | None) -> Predictor:
+def _predictor(row: Row, trained: Trained | None, counted: WindowSet | None, device: torch.device) -> Predictor:
     if trained:
         return NetworkPredictor(trained.network, trained.dtype)
     if counted is not None:
@@ -260,7 +270,7 @@ def _predictor(row: Row, trained: Trained | None, counted: WindowSet | None) -> 
             return FuseAll()
         case "flow":
             return MoveOn(row.flow, row.grid.spec.cell_m)
-    return load_predictor(row.model)
+    return load_predictor(row.model, device)
 
 
 def _window_records(windows: WindowSet, log_of: dict[str, str]) -> tuple[results.WindowRecord, ...]:

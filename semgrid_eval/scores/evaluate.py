@@ -56,6 +56,9 @@ def evaluate(
     counts, predictions, certainties = [], [], []
     region_counts: dict[str, list[Counts]] = {}
     seconds = 0.0
+    if windows.target_frames.is_cuda:  # the first call loads kernels
+        with torch.inference_mode():
+            predictor(_without_answer(windows.batch(slice(batch))))
     for start in range(0, len(windows), batch):
         chosen = slice(start, start + batch)
         part = windows.batch(chosen)
@@ -84,8 +87,14 @@ def evaluate(
 
 
 def _without_answer(batch: WindowBatch) -> WindowBatch:
-    """Hide the target and the mask: a predictor sees past and motion only, and can change neither."""
-    return replace(batch, target=torch.zeros_like(batch.target), mask=torch.zeros_like(batch.mask))
+    """Hide the target and the mask: a predictor sees past and motion only, and can change nothing of what is scored."""
+    return replace(
+        batch,
+        target=torch.zeros_like(batch.target),
+        mask=torch.zeros_like(batch.mask),
+        shift_cells=batch.shift_cells.clone(),  # a view of what other rows see, too; likewise the next
+        lead_s=batch.lead_s.clone(),
+    )
 
 
 def apply_mask(

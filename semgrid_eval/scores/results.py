@@ -6,7 +6,7 @@ RUN/results/<id>/result.json   ResultRecord
 RUN/results/<id>/counts.npz    counts (N, C, C) int64, [target, prediction], mask M left out; where a log has the truth
                                counts_moving and counts_standing alike: cells near moving actors, or near standing
                                ones alone. Near is within a cell of the footprint at the target's time, or of the
-                               newest input's footprint moved by the ego motion, where a repeated input has its ghost
+                               footprint in an input, moved by the ego motion, where a repeated input has its ghost
 RUN/results/<id>/history.csv   of trained models: epoch, updates, learning_rate, loss, validation_loss, seconds
 RUN/results/<id>/predictions.npz   prediction (N, H, W) uint8 class ids, certainty (N, H, W) uint8 (255 = 1.0)
 RUN/windows/<id>.npz           inputs (N, S, T, H, W) uint8 aligned, target (N, H, W) uint8, mask (N, H, W) bool;
@@ -33,6 +33,8 @@ from semgrid_eval.files import read_json, write_json
 FORMAT_VERSION = 1
 PREDICTIONS_FILE = "predictions.npz"
 HISTORY_FILE = "history.csv"
+NOT_RUN = "not run yet"
+"""What the record of a row says whose turn has not come."""
 REGIONS = ("moving", "standing")
 """Where counts are kept apart: near actors that move, and near those that stand."""
 

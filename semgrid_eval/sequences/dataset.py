@@ -142,17 +142,18 @@ class WindowSet:
         )
 
     def actors(self, chosen: slice) -> NDArray[np.uint8] | None:
-        """Flag where true actors are at the target's time, or were in the newest input: -> (B, H, W).
+        """Flag where true actors are at the target's time, or were in an input: -> (B, H, W).
 
-        The newest input's footprints are moved into the target's place, like its grid: there a model without any idea
-        of motion leaves a ghost. Windows of recordings without the truth have no flags; None where no recording has it.
+        The inputs' footprints are moved into the target's place, like their grids: there a model without any idea of
+        motion leaves a ghost. Windows of recordings without the truth have no flags; None where no recording has it.
         """
         if all(flags is None for flags in self.data.actors):
             return None
-        target, newest = self.target_frames[chosen].cpu().numpy(), self.inputs[chosen, -1].cpu().numpy()
-        shift_cells = self.shift_cells[chosen, -1].cpu()
-        ghosts = shift_grids(torch.from_numpy(self._flags_of(newest)), shift_cells).numpy()
-        return np.asarray(self._flags_of(target) | ghosts, np.uint8)
+        found = self._flags_of(self.target_frames[chosen].cpu().numpy())
+        for place in range(self.inputs.shape[1]):
+            flags = torch.from_numpy(self._flags_of(self.inputs[chosen, place].cpu().numpy()))
+            found |= shift_grids(flags, self.shift_cells[chosen, place].cpu()).numpy()
+        return found
 
     def _flags_of(self, frames: NDArray[np.int64]) -> NDArray[np.uint8]:
         result = np.zeros((len(frames), *self.data.grids.shape[-2:]), np.uint8)

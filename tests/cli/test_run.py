@@ -83,6 +83,7 @@ def test_dry_run_tells_updates_and_minutes_and_trains_nothing(here):
 
 def test_dry_run_counts_only_the_epochs_that_are_not_trained_yet(here):
     rows = [{"name": "ED-DC", "model": "ed"}]
+    (here / "trainings").mkdir()
     arguments = ["run", matrix(here, rows), "--logs", "logs", "--trainings", "trainings"]
     call(*arguments, "--out", "first")
     planned = [*arguments, "--out", "second", "--dry-run"]

@@ -1,11 +1,16 @@
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
-from support.fake_run import FakeRow, make_fake_run
+from support.fake_run import FakeRow, counted_row, make_fake_run
 
 from semgrid_eval.report.comparison import headline, reference_of, verdict
 from semgrid_eval.report.estimates import Estimate, score_rows
-from semgrid_eval.report.reading import load_runs
+from semgrid_eval.report.provenance import failures
+from semgrid_eval.report.reading import Run, load_runs
 from semgrid_eval.report.summary import summarise
+from semgrid_eval.scores.results import NOT_RUN
 
 ROWS = (
     FakeRow("Fuse", "BL"),
@@ -72,7 +77,9 @@ def test_the_summary_says_who_leads_by_how_much_and_on_what_it_rests(run):
     found = headline(scores)
     summary = summarise(runs, scores, found)
     lead = scores["ED-DC"].mean["mean_known"] - scores["BL-Fuse"].mean["mean_known"]
-    assert summary.sentences[0].startswith("ED-DC has the highest mean class IoU, ")
+    assert summary.sentences[0].startswith(
+        "Of 4 rows with the same inputs and horizon, ED-DC has the highest mean class IoU, "
+    )
     assert f"+{lead:.3f} over BL-Fuse, the best baseline, clearly better (95% interval +" in summary.sentences[0]
     assert "16 windows from 8 recordings" in summary.sentences[2]
     assert "1 row failed" in summary.sentences[2]
@@ -80,3 +87,30 @@ def test_the_summary_says_who_leads_by_how_much_and_on_what_it_rests(run):
     assert summary.sentences[2].endswith("Intervals of rows with 2 seeds leave out much of the chance in training.")
     assert [tile.label for tile in summary.tiles][-1] == "Mean (known)"
     assert all(0 <= tile.low <= tile.at <= tile.high <= 100 for tile in summary.tiles)
+
+
+def test_rows_that_were_not_run_have_not_failed(run):
+    (found,) = load_runs([run])
+    left = tuple(
+        replace(row, results=(), failures=(), record=row.record.model_copy(update={"results": (), "failure": NOT_RUN}))
+        for row in found.rows[:2]
+    )
+    found = replace(found, rows=(*left, *found.rows[2:]))
+    scores = score_rows(found.rows, np.random.default_rng(0))
+    assert "; 1 row failed, 2 were not run yet." in summarise([found], scores, headline(scores)).sentences[2]
+    assert [failure.name for failure in failures([found]) if failure.kind == "row"] == ["ED-NT"]
+
+
+def test_what_is_nowhere_is_not_compared():
+    rows = [counted_row(name, {"road": [hits] * 12}) for name, hits in (("BL-DC", 50), ("ED-DC", 60))]
+    scores = score_rows(rows, np.random.default_rng(0))
+    summary = summarise([Run(Path(), "", None, tuple(rows))], scores, headline(scores))
+    assert summary.sentences[1] == "Against BL-DC, ED-DC is clearly better on static (known) (+0.100)."
+
+
+def test_only_rows_with_as_many_inputs_are_compared_first():
+    more = counted_row("ED-SL5", {"road": [90] * 12})
+    more = replace(more, record=more.record.model_copy(update={"inputs": 5}))
+    rows = [counted_row("BL-DC", {"road": [50] * 12}), counted_row("ED-DC", {"road": [60] * 12}), more]
+    found = headline(score_rows(rows, np.random.default_rng(0)))
+    assert (found.best.name, found.rival.name, found.compared) == ("ED-DC", "BL-DC", 2)

@@ -143,7 +143,7 @@ def test_window_arrays_are_aligned_and_do_not_depend_on_the_batch():
 
 
 @pytest.mark.parametrize("translate", [True, False])
-def test_actors_lie_at_the_target_and_where_the_newest_input_saw_them(translate):
+def test_actors_lie_at_the_target_and_where_inputs_saw_them(translate):
     recordings = [random_recording(seed, truth=seed != 1) for seed in range(3)]
     data = stack_recordings(recordings, cell_m=0.5)
     plan = training_windows(data.frame_counts, WindowConfig(horizon_steps=2))
@@ -151,11 +151,13 @@ def test_actors_lie_at_the_target_and_where_the_newest_input_saw_them(translate)
     flags = np.concatenate([windows.actors(slice(start, start + 7)) for start in range(0, len(windows), 7)])
     for window, found in zip(plan.windows, flags, strict=True):
         source = recordings[window.recording]
-        newest, target = window.input_frames[-1], window.target_frame
+        target = window.target_frame
         expected = np.zeros((16, 16), np.uint8)
         if source.actors is not None:
-            shift = np.rint((source.position_m[target] - source.position_m[newest]) / 0.5).astype(int)
-            expected = source.actors[target] | slow_shift(source.actors[newest], *shift)
+            expected |= source.actors[target]
+            for frame in window.input_frames:
+                shift = np.rint((source.position_m[target] - source.position_m[frame]) / 0.5).astype(int)
+                expected |= slow_shift(source.actors[frame], *shift)
         np.testing.assert_array_equal(found, expected)
     assert np.array_equal(window_arrays(windows)["actors"], flags)
 

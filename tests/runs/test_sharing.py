@@ -1,0 +1,156 @@
+"""Runs beside and after each other on one folder, models that change, and what libraries raise."""
+
+import time
+from threading import Thread
+
+import pytest
+import torch
+import yaml
+from support.toy_world import street
+
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.executors import InProcess, Processes
+from semgrid_eval.files import locked
+from semgrid_eval.log.store import write_log
+from semgrid_eval.runs import plan
+from semgrid_eval.runs.matrix import load_matrix
+from semgrid_eval.runs.runner import RunOptions, run_matrix
+from semgrid_eval.scores import results
+
+TINY = {"network": {"features": 4, "depth": 2}, "training": {"epochs": 1, "updates_per_epoch": 2, "batch": 2}}
+BL, ED = {"name": "BL", "model": "newest"}, {"name": "ED", "model": "ed"}
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("logs")
+    for i, split in enumerate(("train", "val")):
+        write_log(street(i, frames=9).recording(f"toy_{i:06}_000000", split), folder / split / f"toy{i}.mcap")
+    return folder
+
+
+@pytest.fixture
+def work(logs, tmp_path):
+    """Run rows on one folder; `executor` and the names of rows may be given."""
+
+    def run(rows, executor=None, only=()):
+        window = {"step_frames": 1, "horizon_steps": 1, "target_frame": 6}
+        path = tmp_path / "matrix.yaml"
+        path.write_text(yaml.safe_dump({"defaults": {"window": window, **TINY}, "rows": rows}))
+        options = RunOptions("cpu", tmp_path / "grids", "test", only, executor or InProcess())
+        return run_matrix(load_matrix(str(path)), logs, tmp_path / "run", options)
+
+    run.options = RunOptions("cpu", tmp_path / "grids", "test")
+    run.out = tmp_path / "run"
+    return run
+
+
+def failures(record):
+    return {row.name: row.failure for row in record.rows}
+
+
+def test_rows_that_processes_have_trained_are_known_when_others_are_asked_for(work):
+    trained = work([BL, ED], Processes(2))
+    again = work([BL, ED], Processes(2), only=("BL",))
+    assert failures(again) == {"BL": None, "ED": None}
+    assert again.rows == trained.rows
+    assert again.machine == trained.machine
+
+
+class During(InProcess):
+    """Works in this process, and meanwhile somebody else does something."""
+
+    def __init__(self, other):
+        self._other = other
+
+    def run(self, function, items):
+        self._other()
+        yield from super().run(function, items)
+
+
+def test_what_another_run_does_meanwhile_is_in_the_record(work):
+    record = work([BL, ED], During(lambda: work([BL, ED], only=("ED",))), only=("BL",))
+    assert failures(record) == {"BL": None, "ED": None}
+    assert results.read_run(work.out) == record
+
+
+def test_a_misspelt_row_is_told_before_anything_is_built(work, tmp_path):
+    with pytest.raises(ConfigError, match="'BB' is not a row"):
+        work([BL, ED], only=("BB",))
+    assert not (tmp_path / "grids").exists()
+
+
+MODEL = """
+from pathlib import Path
+import torch
+from beside import WEIGHTS
+
+class Mine:
+    def __init__(self):
+        self.known = int(WEIGHTS.read_text())
+    def __call__(self, batch):
+        batch.lead_s.zero_()
+        batch.shift_cells.zero_()
+        return torch.nn.functional.one_hot((batch.past[:, 0, -1] * self.known).long(), 10).permute(0, 3, 1, 2).float()
+"""
+
+
+def test_a_model_with_other_weights_is_scored_anew_and_cannot_move_what_others_see(work, tmp_path):
+    (tmp_path / "beside.py").write_text(f"from pathlib import Path\nWEIGHTS = Path({str(tmp_path / 'weights')!r})\n")
+    (tmp_path / "mine.py").write_text(MODEL)
+    rows = [{"name": "Mine", "model": f"{tmp_path}/mine.py:Mine"}, BL]
+    found = {}
+    for known in (1, 0):
+        (tmp_path / "weights").write_text(str(known))
+        record = work(rows)
+        assert failures(record) == {"Mine": None, "BL": None}
+        for row in record.rows:
+            counts, _ = results.read_counts(results.result_folder(work.out, row.results[0]))
+            found[row.name, known] = counts.tolist()
+    assert found["Mine", 1] == found["BL", 1] == found["BL", 0]
+    assert found["Mine", 0] != found["Mine", 1]
+
+
+@pytest.mark.parametrize(
+    ("message", "told"),
+    [
+        ("cuDNN error: CUDNN_STATUS_NOT_INITIALIZED\nmore", "RuntimeError: cuDNN error: CUDNN_STATUS_NOT_INITIALIZED"),
+        ("DefaultCPUAllocator: can't allocate memory", "out of memory: DefaultCPUAllocator: can't allocate memory"),
+    ],
+)
+def test_what_libraries_raise_is_a_reason_and_the_others_go_on(work, monkeypatch, message, told):
+    def fail(*_args, **_kwargs):
+        raise RuntimeError(message)
+
+    monkeypatch.setattr("semgrid_eval.runs.unit.train", fail)
+    assert failures(work([ED, BL])) == {"ED": told, "BL": None}
+
+
+def test_a_row_whose_sample_cannot_be_trained_does_not_end_the_plan(work, logs, tmp_path, monkeypatch):
+    work([BL])
+
+    def fail(*_args, **_kwargs):
+        raise torch.OutOfMemoryError("CUDA out of memory.\nTried to allocate")
+
+    monkeypatch.setattr(plan, "train", fail)
+    (tmp_path / "matrix.yaml").write_text(yaml.safe_dump({"defaults": TINY, "rows": [ED, BL]}))
+    units = plan.plan_run(load_matrix(str(tmp_path / "matrix.yaml")), logs, work.out, work.options)
+    assert units[0].rows == ("ED",)
+    assert units[0].failure is not None
+
+
+def test_one_at_a_time_works_under_a_lock(tmp_path):
+    seen = []
+
+    def work():
+        with locked(tmp_path / "folder" / "training"):
+            seen.append("begun")
+            time.sleep(0.05)
+            seen.append("done")
+
+    threads = [Thread(target=work) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert seen == ["begun", "done"] * 3
