@@ -87,6 +87,18 @@ def test_grids_are_built_once_and_again_when_the_configuration_changes(tmp_path)
     assert (other.recordings[0].grids != first.recordings[0].grids).any()
 
 
+def test_only_the_sensors_that_are_asked_for_are_kept_in_memory(tmp_path):
+    path = tmp_path / "toy.mcap"
+    write_log(street(2, frames=2).recording(), path)
+    (whole,) = build_grids([path], tmp_path / "grids", GridConfig()).recordings
+    for sensors in (["split2_lower", "full"], ["full"]):  # built, and then found
+        (part,) = build_grids([path], tmp_path / "grids", GridConfig(), sensors=sensors).recordings
+        assert set(part.sensors) == set(sensors)
+        for name in sensors:
+            mine, all_of = part.grids[part.sensors.index(name)], whole.grids[whole.sensors.index(name)]
+            np.testing.assert_array_equal(mine, all_of)
+
+
 def test_damaged_grids_are_made_anew(tmp_path):
     path = tmp_path / "toy.mcap"
     write_log(street(2, frames=2).recording(), path)
