@@ -5,17 +5,16 @@ Whatever has the form of `Executor` can take the place of these two, for example
 
 import multiprocessing
 import os
+import pickle
 import signal
 import threading
+import traceback
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, TypeVar
-
-if TYPE_CHECKING:
-    from ctypes import Array, c_byte
-    from multiprocessing.sharedctypes import Synchronized
+from multiprocessing.connection import Connection, wait
+from typing import Any, Protocol, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -23,6 +22,7 @@ R = TypeVar("R")
 _CONTEXT = multiprocessing.get_context("spawn")  # a fork would copy whatever threads and locks the caller holds
 # Libraries read these once, when they are first imported; each worker gets its share of the cores.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+_GRACE_S = 5.0  # for a process to end by itself
 
 
 @dataclass(frozen=True)
@@ -85,52 +85,51 @@ class Processes:
         self._gpus = tuple(gpus)
 
     def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
-        """Yield results as they come; stopping early drops what has not begun.
+        """Yield results as they come; stopping early drops what has not begun and breaks off what has.
 
-        A process that is killed ends all others, too. What was being worked on then is done once more by itself, and
-        what had not begun goes on together.
+        What loses its process, or finds no room beside others, is done once more by itself.
         """
-        left, alone = list(range(len(items))), []
-        while left:
-            begun = _CONTEXT.RawArray("b", len(items))
-            lost = []
-            for index, result in self._together(function, items, left, begun):
-                if isinstance(result, WorkerDied) and len(items) > 1:
-                    lost.append(index)
-                else:
-                    yield index, result
-            suspects = [index for index in lost if begun[index]] or lost
-            alone += suspects
-            left = [index for index in lost if index not in suspects]
+        alone = []
+        for index, result in self._together(function, items, range(len(items))):
+            if isinstance(result, WorkerDied) and len(items) > 1:
+                alone.append(index)
+            else:
+                yield index, result
         for index in alone:
-            yield from self._together(function, items, [index], _CONTEXT.RawArray("b", len(items)))
+            yield from self._together(function, items, [index])
 
     def _together(
-        self, function: Callable[[T], R], items: Sequence[T], chosen: Sequence[int], begun: "Array[c_byte]"
+        self, function: Callable[[T], R], items: Sequence[T], chosen: Sequence[int]
     ) -> Iterator[tuple[int, R | WorkerDied]]:
-        """Work on the chosen items; of each one whose turn has come, `begun` is 1."""
-        pool = ProcessPoolExecutor(
-            min(self.parallel, len(chosen)),
-            mp_context=_CONTEXT,
-            initializer=_start_worker,
-            initargs=(self.threads, self._gpus, _CONTEXT.Value("i", 0), begun),
-        )
+        """Work on the chosen items, each in the first process that is free."""
+        waiting = deque(chosen)
+        workers = [_Worker(self._environment(number)) for number in range(min(self.parallel, len(chosen)))]
+        at_work: dict[_Worker, int] = {}
+
+        def begin_next(worker: _Worker) -> None:
+            index = waiting.popleft()
+            worker.begin(function, items[index])
+            at_work[worker] = index
+
         try:
-            futures: dict[Future[R], int] = {}
-            for index in chosen:
-                try:
-                    futures[pool.submit(_begin, function, items[index], index)] = index
-                except BrokenProcessPool:
-                    yield index, WorkerDied()
-            for future in as_completed(futures):
-                try:
-                    yield futures[future], future.result()
-                except BrokenProcessPool:
-                    yield futures[future], WorkerDied()
-                except NoRoomError as error:
-                    yield futures[future], WorkerDied(str(error))
+            for worker in workers:
+                begin_next(worker)
+            while at_work:
+                done = wait([worker.pipe for worker in at_work])
+                for worker in [worker for worker in at_work if worker.pipe in done]:
+                    index, result = at_work.pop(worker), worker.result()
+                    if waiting:
+                        begin_next(worker)
+                    yield index, result
         finally:
-            pool.shutdown(cancel_futures=True)
+            for worker in workers:
+                worker.leave(at_once=worker in at_work)
+            for worker in workers:
+                worker.join()
+
+    def _environment(self, number: int) -> dict[str, str]:
+        gpu = {"CUDA_VISIBLE_DEVICES": self._gpus[number % len(self._gpus)]} if self._gpus else {}
+        return thread_variables(self.threads) | gpu
 
 
 def local_executor(workers: int, *, gpus: Sequence[str] = ()) -> Executor:
@@ -148,20 +147,85 @@ def thread_variables(threads: int) -> dict[str, str]:
     return dict.fromkeys(_THREAD_VARIABLES, str(threads))
 
 
-_begun: "Array[c_byte] | None" = None  # in a worker: marks the items whose turn has come
+class _Worker:
+    """A process that works on one item at a time; one that dies is replaced when there is more to do."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        self._environment = environment
+        self._start()
+
+    def _start(self) -> None:
+        self.pipe, theirs = _CONTEXT.Pipe()
+        # A daemon is ended before the interpreter, even where the traceback of an error still holds the iteration.
+        self._process = _CONTEXT.Process(target=_serve, args=(theirs, self._environment), daemon=True)
+        self._process.start()
+        theirs.close()  # so that the pipe ends with the process
+
+    def begin(self, function: Callable[[T], R], item: T) -> None:
+        """Hand over an item; the pipe has something to read once it is done or the process dead."""
+        if self.pipe.closed:
+            self._start()
+        work = pickle.dumps((function, item))
+        with suppress(ConnectionError):  # it has died, and so says the result
+            self.pipe.send_bytes(work)
+
+    def result(self) -> Any:  # noqa: ANN401 - of the function that was handed over
+        """Wait for the result of the item, or raise what its function raised."""
+        try:
+            answer = self.pipe.recv_bytes()
+        except (EOFError, OSError):
+            self.pipe.close()
+            self.join()
+            return WorkerDied()
+        result, error = pickle.loads(answer)
+        if isinstance(error, NoRoomError):
+            return WorkerDied(str(error))
+        if error is not None:
+            raise error
+        return result
+
+    def leave(self, *, at_once: bool) -> None:
+        """Let the process end when it waits for work, or at once."""
+        self.pipe.close()
+        if at_once:
+            self._process.terminate()
+
+    def join(self) -> None:
+        """Wait until the process has ended."""
+        self._process.join(_GRACE_S)
+        self._process.kill()
+        self._process.join()
 
 
-def _start_worker(threads: int, gpus: tuple[str, ...], started: "Synchronized[int]", begun: "Array[c_byte]") -> None:
-    global _begun  # shared memory reaches a process only when it starts
-    _begun = begun
+def _serve(pipe: Connection, environment: dict[str, str]) -> None:
+    """Work on what comes through the pipe until its other end is closed."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    # Ctrl-C stops the parent alone: it drops what waits, and what is being written is finished.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.environ.update(thread_variables(threads))
-    with started.get_lock():
-        number, started.value = started.value, started.value + 1
-    if gpus:
-        os.environ["CUDA_VISIBLE_DEVICES"] = gpus[number % len(gpus)]
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which then ends this process
+    signal.signal(signal.SIGTERM, _unwind)
+    os.environ.update(environment)
+    with suppress(EOFError, ConnectionError):
+        while True:
+            pipe.send_bytes(_answer(pipe.recv_bytes()))
+
+
+def _unwind(_signal: int, _frame: object) -> None:
+    """Leave as with an error, so that half-written files are removed."""
+    raise SystemExit(1)
+
+
+def _answer(work: bytes) -> bytes:
+    """Work on an item; the answer holds its result and the error that it ended with, one of them None."""
+    try:
+        function, item = pickle.loads(work)
+        return pickle.dumps((function(item), None))
+    except Exception as error:
+        story = "".join(traceback.format_exception(error))
+        error.add_note(f"In a worker process:\n{story}")
+        with suppress(Exception):  # not every error can be copied
+            answer = pickle.dumps((None, error))
+            pickle.loads(answer)
+            return answer
+        return pickle.dumps((None, RuntimeError(story)))
 
 
 def _end_with_parent() -> None:
@@ -170,9 +234,3 @@ def _end_with_parent() -> None:
     assert parent is not None
     parent.join()
     os._exit(1)
-
-
-def _begin(function: Callable[[T], R], item: T, index: int) -> R:
-    assert _begun is not None
-    _begun[index] = 1
-    return function(item)

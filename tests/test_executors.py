@@ -1,24 +1,52 @@
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from support.pieces import environment, fit_alone, square_or_die
+from support.pieces import environment, fit_alone, square_or_die, write_a_minute
 
+from semgrid_eval.errors import InputError
 from semgrid_eval.executors import InProcess, Processes, WorkerDied, available_cores, local_executor, thread_variables
+from semgrid_eval.files import read_json
 
 BUSY_PARENT = """
-from semgrid_eval.executors import Processes
-from support.pieces import last_a_minute
+import sys
+from pathlib import Path
 
-for _ in Processes(2).run(last_a_minute, range(6)):
-    pass
+from semgrid_eval.executors import Processes
+from support.pieces import write_a_minute
+
+def work():
+    for _ in Processes(2).run(write_a_minute, [Path(name) for name in sys.argv[1:]]):
+        raise KeyboardInterrupt
+
+try:
+    work()
+except KeyboardInterrupt:
+    sys.exit("stopped")
 """
+
+
+def be_deaf_or_wait_for_one_who_is(path):
+    if path.name == "deaf":
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        path.touch()
+        time.sleep(60)
+    while not path.with_name("deaf").exists():
+        time.sleep(0.02)
+
+
+def raise_what_cannot_be_copied(_item):
+    error = ValueError("of a kind that cannot be copied")
+    error.process = threading.Lock()
+    raise error
 
 
 def work_a_while_or_die(value):
@@ -40,14 +68,14 @@ def gpu_when_all_have_begun(folder, expected, _item):
 
 
 @pytest.fixture
-def busy_parent():
+def busy_parent(tmp_path):
     """Give a process whose two workers have begun; its standard output ends when the last of the three ends."""
-    here = Path(__file__).parent
+    command = [sys.executable, "-c", BUSY_PARENT, *(str(tmp_path / name) for name in ("slow", "first", *"abcd"))]
     parent = subprocess.Popen(
-        [sys.executable, "-c", BUSY_PARENT], cwd=here, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command, cwd=Path(__file__).parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     try:
-        assert [parent.stdout.readline() for _ in range(2)] == ["begun\n"] * 2
+        assert {parent.stdout.readline() for _ in range(2)} == {"first\n", "slow\n"}
         yield parent
     finally:
         parent.kill()
@@ -84,6 +112,46 @@ def test_what_a_killed_process_had_not_begun_goes_on_together():
 def test_processes_end_with_a_parent_that_is_killed(busy_parent, number):
     busy_parent.send_signal(number)
     assert busy_parent.communicate(timeout=30)[0] == ""
+
+
+def test_ctrl_c_drops_what_has_not_begun_and_breaks_off_what_has(busy_parent, tmp_path):
+    busy_parent.send_signal(signal.SIGINT)
+    assert busy_parent.communicate(timeout=30) == ("", "stopped\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_at_a_result_drops_what_has_not_begun_and_breaks_off_what_has(busy_parent, tmp_path):
+    (tmp_path / "go on").touch()
+    begun, errors = busy_parent.communicate(timeout=30)
+    assert begun in ("", "a\n")  # the process whose result it was has been given its next
+    assert errors == "stopped\n"
+    assert {path.name for path in tmp_path.iterdir()} == {"first", "go on"}
+
+
+def test_leaving_an_iteration_does_not_wait_for_what_is_worked_on(tmp_path):
+    (tmp_path / "go on").touch()
+    start_s = time.monotonic()
+    for index, _ in Processes(2).run(write_a_minute, [tmp_path / "slow", tmp_path / "first"]):
+        assert index == 1
+        break
+    assert time.monotonic() - start_s < 30
+    assert not multiprocessing.active_children()
+
+
+def test_a_process_that_does_not_end_when_told_to_is_killed(tmp_path, monkeypatch):
+    monkeypatch.setattr("semgrid_eval.executors._GRACE_S", 0.2)
+    start_s = time.monotonic()
+    next(Processes(2).run(be_deaf_or_wait_for_one_who_is, [tmp_path / "deaf", tmp_path / "other"]))
+    assert time.monotonic() - start_s < 30
+    assert not multiprocessing.active_children()
+
+
+def test_an_error_of_the_function_is_raised_here_and_says_where_it_was(tmp_path):
+    with pytest.raises(InputError, match="missing: cannot be read") as caught:
+        list(Processes(2).run(read_json, [tmp_path / "missing"]))
+    assert "in read_json" in caught.value.__notes__[0]
+    with pytest.raises(RuntimeError, match=r"\nValueError: of a kind that cannot be copied"):
+        list(Processes(2).run(raise_what_cannot_be_copied, [0]))
 
 
 def test_numeric_libraries_have_the_threads_that_an_executor_names():
