@@ -15,7 +15,7 @@ from semgrid_eval.errors import InputError
 
 try:
     import fcntl
-except ImportError:  # Windows: nobody waits for anybody
+except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 DIGEST_CHARACTERS = 16
@@ -48,6 +48,8 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
 def locked(folder: Path) -> Iterator[None]:
     """Let one process at a time into the block for a folder, which is made if need be; a lock ends with its process.
 
+    Where the system or the folder's file system has no locks, nobody waits.
+
     Raises:
         InputError: the folder cannot be written to.
     """
@@ -58,7 +60,8 @@ def locked(folder: Path) -> Iterator[None]:
         raise InputError(f"cannot be written: {_reason(error)}", path=folder) from error
     with stream:
         if fcntl is not None:
-            fcntl.flock(stream, fcntl.LOCK_EX)
+            with suppress(OSError):
+                fcntl.flock(stream, fcntl.LOCK_EX)
         yield
 
 

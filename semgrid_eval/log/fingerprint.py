@@ -60,12 +60,15 @@ def kept_fingerprints(
     """
     kept = _kept(cache / KEPT)
     missing = [digest for digest in logs if digest not in kept]
-    for done, (index, outcome) in enumerate(executor.run(_fingerprint_if_sound, [logs[d] for d in missing]), start=1):
-        if isinstance(outcome, str):
-            kept[missing[index]] = outcome
-        progress(done, len(missing), logs[missing[index]].stem)
-    if missing:
-        write_json(cache / KEPT, kept)
+    work = executor.run(_fingerprint_if_sound, [logs[digest] for digest in missing])
+    try:
+        for done, (index, outcome) in enumerate(work, start=1):
+            if isinstance(outcome, str):
+                kept[missing[index]] = outcome
+            progress(done, len(missing), logs[missing[index]].stem)
+    finally:
+        if missing:
+            write_json(cache / KEPT, kept)
     return {digest: kept[digest] for digest in logs if digest in kept}
 
 

@@ -13,6 +13,7 @@ from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.errors import InputError
 from semgrid_eval.sequences.dataset import WindowBatch
 
+_beside: Path | None = None  # folder of the model's file that was loaded last
 ENTRY_POINT_GROUP = "semgrid_eval.models"
 
 
@@ -88,8 +89,7 @@ def _from_file(path: Path, name: str) -> Any:  # noqa: ANN401 - whatever the fil
     spec = importlib.util.spec_from_file_location(f"semgrid_eval_model_{path.stem}", path)
     if not path.is_file() or spec is None or spec.loader is None:
         raise InputError("is no Python file; a model is given as path.py:Class", path=path)
-    if (folder := str(path.resolve().parent)) not in sys.path:
-        sys.path.insert(0, folder)  # as if the file were run: it may import what lies beside it
+    _look_beside(path.resolve().parent)
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses and pickle look a class's module up by name
     try:
@@ -99,6 +99,19 @@ def _from_file(path: Path, name: str) -> Any:  # noqa: ANN401 - whatever the fil
     if not hasattr(module, name):
         raise InputError(f"defines no {name!r}", path=path)
     return getattr(module, name)
+
+
+def _look_beside(folder: Path) -> None:
+    """Let a model import what lies beside it, as if its file were run, and not what lies beside the model before."""
+    global _beside
+    if _beside is not None and _beside != folder:
+        sys.path.remove(str(_beside))
+        for name, module in list(sys.modules.items()):
+            if (file := getattr(module, "__file__", None)) and _beside in Path(file).parents:
+                del sys.modules[name]
+    if _beside != folder:
+        sys.path.insert(0, str(folder))
+        _beside = folder
 
 
 def _from_entry_point(name: str) -> Any:  # noqa: ANN401 - whatever the package registered

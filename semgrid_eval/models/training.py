@@ -3,6 +3,7 @@
 import hashlib
 import math
 import time
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self
@@ -14,7 +15,7 @@ from torch.nn import functional as F
 
 from semgrid_eval.config import Config
 from semgrid_eval.errors import SemgridError
-from semgrid_eval.files import digest_value
+from semgrid_eval.files import digest_value, locked
 from semgrid_eval.models.checkpoint import EpochRecord, TrainingFolder
 from semgrid_eval.models.device import Precision, choose_precision, keep_freed_memory, seeded
 from semgrid_eval.models.network import (
@@ -121,14 +122,16 @@ def train(
     }
     store = TrainingFolder(folder, digest_value(key))
     dtype = choose_precision(training_config.precision, device)
-    if store.is_complete():
-        network, history = store.read(device)
-    else:
-        network = seeded_network(
-            network_config, grids=windows.grids_per_window, preset=training_config.optimizer_preset, seed=seed
-        ).to(device)
-        trainer = _Trainer(network, training_config, windows.to(device), seed, dtype)
-        history = trainer.run(store, validation.to(device) if validation else None, progress)
+    # Whoever else trains the same waits, and then finds it complete; what is complete need not be writable.
+    with nullcontext() if store.is_complete() else locked(folder):
+        if store.is_complete():
+            network, history = store.read(device)
+        else:
+            network = seeded_network(
+                network_config, grids=windows.grids_per_window, preset=training_config.optimizer_preset, seed=seed
+            ).to(device)
+            trainer = _Trainer(network, training_config, windows.to(device), seed, dtype)
+            history = trainer.run(store, validation.to(device) if validation else None, progress)
     return Trained(network.eval(), tuple(history), sum(row.seconds for row in history), dtype)
 
 

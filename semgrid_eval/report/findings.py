@@ -1,9 +1,9 @@
 """What a run says about the paper's claims: each one holds, does not hold, stays undecided or was not run."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ import pandas as pd
 from semgrid_eval.report.cells import ABSENT, MINUS, Cell, Line, Table, difference_cell, interval_phrase, plural
 from semgrid_eval.report.claims import MARGIN, WINDOW_MS, Check, Claim, Rule, claims
 from semgrid_eval.report.estimates import LABELS, Estimate, RowScores, Scores, weighted_sum
-from semgrid_eval.report.reading import Run
+from semgrid_eval.report.reading import Row, Run
 
 TRUTH = "logs that tell where true actors move"
 
@@ -65,8 +65,8 @@ def find(runs: Sequence[Run], scores: Scores, regions: Mapping[str, Scores]) -> 
     """Test every claim on every run, from the scores of all cells and of those near moving and standing actors."""
     found = []
     for run in runs:
-        places = {"": _by_record(scores, run.folder)}
-        places |= {name: _by_record(near, run.folder) for name, near in regions.items()}
+        places = {"": _by_record(scores, run)}
+        places |= {name: _by_record(near, run) for name, near in regions.items()}
         for claim in claims(places[""]):
             found.append(Finding(run.tag, claim, tuple(_outcome(check, places) for check in claim.checks)))
     return found
@@ -152,15 +152,19 @@ def _tag(findings: Sequence[Finding]) -> str:
     return next((f" ({each.run})" for each in findings if each.run), "")
 
 
-def _by_record(scores: Scores, run: Path) -> dict[str, RowScores]:
+def _by_record(scores: Scores, run: Run) -> dict[str, RowScores]:
     """Find a run's rows by the names that presets give them: the row's own, else the one of its model and experiment.
 
     Where several rows are of one model and experiment, nobody knows which of them a claim is about.
     """
-    mine = [entry for entry in scores.values() if entry.row.run == run]
-    kinds = [f"{entry.row.record.model}-{entry.row.record.experiment}" for entry in mine]
-    found = {kind: entry for kind, entry in zip(kinds, mine, strict=True) if kinds.count(kind) == 1}
+    rows_of = Counter(_kind(row) for row in run.rows)
+    mine = [entry for entry in scores.values() if entry.row.run == run.folder]
+    found = {_kind(entry.row): entry for entry in mine if rows_of[_kind(entry.row)] == 1}
     return found | {entry.row.record.name: entry for entry in mine}
+
+
+def _kind(row: Row) -> str:
+    return f"{row.record.model}-{row.record.experiment}"
 
 
 def _outcome(check: Check, places: Mapping[str, Scores]) -> Outcome:

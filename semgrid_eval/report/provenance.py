@@ -76,12 +76,13 @@ def _data_set(name: str, logs: Sequence[LogRecord]) -> str:
     digest = digest_value(sorted((log.split, log.name, log.digest) for log in logs))
     text = f"{name}: {_by_split(log.split for log in logs)}; digest {digest}"
     published = published_fingerprints(name)
-    known = [log.fingerprint[:FINGERPRINT_CHARACTERS] for log in logs if log.fingerprint]
-    if not published or not known:  # runs of older versions know none
+    # A log to train on and to score is there twice.
+    known = {log.digest: (log.fingerprint or "")[:FINGERPRINT_CHARACTERS] for log in logs}
+    if not published or not any(known.values()):  # runs of older versions know none
         return text
-    if others := len(logs) - sum(fingerprint in published for fingerprint in known):
-        return f"{text}; {others} of {len(logs)} are not as published"
-    return f"{text}; {'all' if len(logs) == len(published) else f'{len(logs)} of {len(published):,}'}, as published"
+    if others := sum(fingerprint not in published for fingerprint in known.values()):
+        return f"{text}; {others} of {len(known)} are not as published"
+    return f"{text}; {'all' if len(known) == len(published) else f'{len(known)} of {len(published):,}'}, as published"
 
 
 def _by_split(splits: Iterable[str]) -> str:

@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import torch
-
 from semgrid_eval.errors import InputError, SemgridError, first_line
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.checkpoint import HISTORY_FILE, read_history
@@ -82,13 +80,13 @@ def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], speed: "_Speed
     """Plan one unit; `priced` collects the trainings that are counted already, which the unit may share."""
     try:
         job = worker.look(unit.row, unit.seed)
-        done = worker.is_done(job)
+        done = unit.row.built_in and worker.is_done(job)
         if done or job.training is None or job.training.id in priced:
             return PlannedUnit(rows, unit.seed, len(job.scored), 0, 0, 0.0, done)
         made = _epochs_made(job.training)
         updates = _updates_left(unit.row, made)
         seconds = speed.seconds(unit.row, job.training, made) if updates else 0.0
-    except (SemgridError, torch.OutOfMemoryError, MemoryError) as error:
+    except (SemgridError, RuntimeError, MemoryError) as error:  # torch runs out of memory by a RuntimeError
         return PlannedUnit(rows, unit.seed, 0, 0, 0, 0.0, done=False, failure=first_line(error))
     priced.add(job.training.id)
     return PlannedUnit(rows, unit.seed, len(job.scored), updates, updates * unit.row.training.batch, seconds, done)

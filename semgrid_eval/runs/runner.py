@@ -92,6 +92,7 @@ def run_matrix(
     worker = make_worker(matrix, logs, out, options, stage)
     for sources in worker.sources:
         sources.prepare()
+        sources.identify()
     outcomes: dict[str, Outcome] = {}
 
     def look_for_others() -> None:
@@ -182,6 +183,7 @@ def _unit_work(
         options.grids.resolve(),
         options.validation_logs and options.validation_logs.resolve(),
         options.trainings and options.trainings.resolve(),
+        options.executor.threads,
     )
     with stage("rows") as progress:
         yield partial(_attempt_elsewhere, place), progress
@@ -197,6 +199,7 @@ class _Place(NamedTuple):
     grids: Path
     validation_logs: Path | None
     trainings: Path | None
+    threads: int | None
 
 
 def _attempt_elsewhere(place: _Place, unit: Unit) -> Outcome:
@@ -206,6 +209,8 @@ def _attempt_elsewhere(place: _Place, unit: Unit) -> Outcome:
 @lru_cache(maxsize=1)
 def _worker_at(place: _Place) -> Worker:
     """Make the worker of a process that gets units of one run; it keeps the grids between them."""
+    if place.threads is not None:
+        torch.set_num_threads(place.threads)  # torch may have been imported before its environment was set
     options = RunOptions(
         place.device, place.grids, command="", validation_logs=place.validation_logs, trainings=place.trainings
     )

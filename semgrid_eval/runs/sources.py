@@ -50,12 +50,12 @@ class Sources:
         self.log_of: dict[str, str] = {}  # path below the folder of logs, by name of the recording
 
     def prepare(self) -> None:
-        """Build all grids of the matrix now, as many logs at once as the executor works on.
-
-        The logs of benchmarks are fingerprinted, too, so that a report can hold them against the published ones.
-        """
+        """Build all grids of the matrix now, as many logs at once as the executor works on."""
         for config in self._configs.values():
             self._grids(config)
+
+    def identify(self) -> None:
+        """Fingerprint the logs of benchmarks, so that a report can hold them against the published ones."""
         records = [record for record in self.records.values() if published_fingerprints(record.dataset)]
         if records:
             logs = {record.digest: self._folder / record.path for record in records}

@@ -10,7 +10,7 @@ import torch
 from semgrid_eval.arrays import write_arrays
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
-from semgrid_eval.files import atomic_folder, digest_files, digest_value, locked
+from semgrid_eval.files import atomic_folder, digest_files, digest_value
 from semgrid_eval.grids.build import FORMAT_VERSION as GRIDS
 from semgrid_eval.models.baselines import FuseAll, OverlaySensors, RepeatNewest
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
@@ -184,8 +184,7 @@ class Worker:
         return Training(training_id, self._trainings / training_id, seed, windows, watched)
 
     def _train(self, job: "Training", row: Row) -> Trained:
-        # Whoever else trains the same waits here, and then finds it done.
-        with locked(job.folder), self._stage(f"train {row.name} (seed {job.seed})") as progress:
+        with self._stage(f"train {row.name} (seed {job.seed})") as progress:
             return train(
                 job.windows,
                 row.network,

@@ -1,5 +1,7 @@
 """Runs beside and after each other on one folder, models that change, and what libraries raise."""
 
+import errno
+import shutil
 import time
 from threading import Thread
 
@@ -109,6 +111,38 @@ def test_a_model_with_other_weights_is_scored_anew_and_cannot_move_what_others_s
             found[row.name, known] = counts.tolist()
     assert found["Mine", 1] == found["BL", 1] == found["BL", 0]
     assert found["Mine", 0] != found["Mine", 1]
+
+
+def test_models_of_two_folders_do_not_share_what_lies_beside_them(work, tmp_path):
+    rows = []
+    for known in (1, 0):
+        folder = tmp_path / f"version{known}"
+        folder.mkdir()
+        (folder / "weights").write_text(str(known))
+        (folder / "beside.py").write_text("from pathlib import Path\nWEIGHTS = Path(__file__).parent / 'weights'\n")
+        (folder / "mine.py").write_text(MODEL)
+        rows.append({"name": f"Mine{known}", "model": f"{folder}/mine.py:Mine"})
+    first, second = (row.results[0] for row in work(rows).rows)
+    counts = [results.read_counts(results.result_folder(work.out, name))[0] for name in (first, second)]
+    assert (counts[0] != counts[1]).any()
+
+
+def test_a_training_that_is_complete_is_read_without_writing(work):
+    work([ED])
+    (lock,) = (work.out / "trainings").rglob(".lock")
+    lock.unlink()
+    shutil.rmtree(work.out / "results")
+    assert failures(work([ED])) == {"ED": None}
+    assert not lock.exists()
+
+
+def test_where_there_are_no_locks_nobody_waits(tmp_path, monkeypatch):
+    def refuse(*_args):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    with locked(tmp_path):
+        pass
 
 
 @pytest.mark.parametrize(

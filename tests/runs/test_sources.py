@@ -31,6 +31,8 @@ def sources(logs, cache):
 def test_the_logs_of_a_published_benchmark_alone_are_fingerprinted(logs, tmp_path):
     found = sources(logs, tmp_path)
     found.prepare()
+    assert {record.fingerprint for record in found.records.values()} == {None}
+    found.identify()
     assert {record.dataset: record.fingerprint for record in found.records.values()} == {
         "town-v1/small": fingerprint(logs / "val" / "town-v1_small.mcap"),
         "town-v1/tiny": None,
