@@ -8,6 +8,7 @@ import os
 import pickle
 import signal
 import threading
+import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -124,8 +125,9 @@ class Processes:
         finally:
             for worker in workers:
                 worker.leave(at_once=worker in at_work)
+            end_s = time.monotonic() + _GRACE_S
             for worker in workers:
-                worker.join()
+                worker.join(end_s)
 
     def _environment(self, number: int) -> dict[str, str]:
         gpu = {"CUDA_VISIBLE_DEVICES": self._gpus[number % len(self._gpus)]} if self._gpus else {}
@@ -175,7 +177,7 @@ class _Worker:
             answer = self.pipe.recv_bytes()
         except (EOFError, OSError):
             self.pipe.close()
-            self.join()
+            self.join(time.monotonic() + _GRACE_S)
             return WorkerDied()
         result, error = pickle.loads(answer)
         if isinstance(error, NoRoomError):
@@ -190,9 +192,9 @@ class _Worker:
         if at_once:
             self._process.terminate()
 
-    def join(self) -> None:
-        """Wait until the process has ended."""
-        self._process.join(_GRACE_S)
+    def join(self, end_s: float) -> None:
+        """Wait until the process has ended, on the monotonic clock at most until then; it is killed after that."""
+        self._process.join(max(0.0, end_s - time.monotonic()))
         self._process.kill()
         self._process.join()
 
