@@ -22,7 +22,13 @@ R = TypeVar("R")
 
 _CONTEXT = multiprocessing.get_context("spawn")  # a fork would copy whatever threads and locks the caller holds
 # Libraries read these once, when they are first imported; each worker gets its share of the cores.
-_THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+_THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "OPENCV_FOR_THREADS_NUM",
+)
 _GRACE_S = 5.0  # for a process to end by itself
 
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from support.pieces import environment, fit_alone, square_or_die, write_a_minute
+from support.pieces import environment, fit_alone, square_or_die, threads_of_libraries, write_a_minute
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import InProcess, Processes, WorkerDied, available_cores, local_executor, thread_variables
@@ -158,6 +158,7 @@ def test_numeric_libraries_have_the_threads_that_an_executor_names():
     executor = Processes(2, threads=3)
     assert executor.threads == 3
     assert all(thread_variables(3).items() <= found.items() for _, found in executor.run(environment, range(2)))
+    assert dict(Processes(2, threads=1).run(threads_of_libraries, range(2))) == {0: (1, 1, 1), 1: (1, 1, 1)}
     assert Processes(2).threads == max(1, available_cores() // 2)
     assert InProcess().threads is None
 

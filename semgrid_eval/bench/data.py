@@ -2,8 +2,11 @@
 
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+
+import cv2
 
 from semgrid_eval.bench.material import Material
 from semgrid_eval.bench.measurement import Measurement, processor_s, wall_s
@@ -45,7 +48,8 @@ def measure_rendering(material: Material) -> Iterator[Measurement]:
     for stereo, width_px, height_px, at_most_s in _RENDERED:
         plan = material.plan(stereo, width_px, height_px)
         _render(replace(plan, width_px=64, height_px=32))  # loads and compiles what the first rendering needs
-        seconds = processor_s(partial(_render, plan), material.settings.repeats)
+        with _one_thread():
+            seconds = processor_s(partial(_render, plan), material.settings.repeats)
         what = f"{FRAME_COUNT} frames, {plan.width_px} x {plan.height_px}, {stereo}"
         yield Measurement(what, seconds, "s CPU", at_most_s)
 
@@ -68,6 +72,17 @@ def measure_grids(material: Material) -> Iterator[Measurement]:
         took_s = wall_s(partial(build_log, material.log, config), material.settings.repeats)
         count = len(config.all_sensors())
         yield Measurement(f"grids of {count} sensor{'s' * (count > 1)}", FRAME_COUNT / took_s, "frames/s")
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let OpenCV work in one thread inside the block, as it does in each of several workers."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
 
 
 def _render(plan: RecordingPlan) -> None:

@@ -25,6 +25,14 @@ def environment(_item):
     return dict(os.environ)
 
 
+def threads_of_libraries(_item):
+    import cv2
+    import numba
+    import torch
+
+    return cv2.getNumThreads(), numba.get_num_threads(), torch.get_num_threads()
+
+
 def write_a_minute(path):
     """Tell on the standard output that this file has begun; only the first one ends before a test does."""
     with atomic_file(path):
