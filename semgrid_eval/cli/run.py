@@ -123,5 +123,7 @@ def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -
         state = unit.failure or ("done" if unit.done else "to do")
         numbers = (unit.seed if unit.seed is not None else "-", unit.windows, unit.updates, unit.samples)
         click.echo("\t".join(map(str, (",".join(unit.rows), *numbers, f"{unit.seconds / 60:.1f}", state))))
-    say(f"About {total_seconds(units) / 60:.0f} minutes on this machine, one row at a time.")
+    at_once = options.executor.parallel
+    minutes = total_seconds(units) / 60 / at_once
+    say(f"About {minutes:.0f} minutes on this machine, {at_once} at a time.")
     return 1 if any(unit.failure for unit in units) else 0

@@ -1,3 +1,4 @@
+import re
 import shlex
 from dataclasses import replace
 
@@ -75,6 +76,9 @@ def test_dry_run_tells_updates_and_minutes_and_trains_nothing(here):
     assert table[2][1:5] == ["0", "1", "6", "12"]
     assert not (here / "run" / "trainings").exists()
     assert not (here / "run" / "results").exists()
+    assert re.search(
+        r"About \d+ minutes on this machine, 2 at a time\.", call(*arguments, "--dry-run", "--jobs", "2").stderr
+    )
     alone = call(*arguments, "--dry-run", "--row", "ED-SL2").stdout.splitlines()
     assert [line.split("\t")[0] for line in alone] == ["rows", "ED-DC,ED-SL2"]
     call(*arguments)
