@@ -21,7 +21,7 @@ from semgrid_eval.frames.synthetic.published import (
     short_fingerprints,
 )
 from semgrid_eval.log.fingerprint import fingerprints
-from semgrid_eval.log.store import LogReader, find_logs
+from semgrid_eval.log.store import LogReader, find_logs, label_of
 from semgrid_eval.progress import silent
 
 
@@ -35,7 +35,7 @@ def freeze(out: Path) -> str:
     if len(logs) != expected:
         raise InputError(f"holds {len(logs)} logs, {name} {size} has {expected} recordings", path=out)
     found = fingerprints(logs, executor=local_executor(available_cores()), progress=silent)
-    labels = [log.relative_to(out).with_suffix("").as_posix() for log in logs]
+    labels = [label_of(log, out) for log in logs]
     short = short_fingerprints(dict(zip(labels, found, strict=True)))
     chosen |= {"fingerprints": " ".join(short.values()), "versions": versions()}
     write_json(definition_file(name), definition)

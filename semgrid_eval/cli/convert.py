@@ -10,7 +10,7 @@ from semgrid_eval.cli.work import chosen_executor, executor_options, workers_opt
 from semgrid_eval.errors import InputError, MissingExtraError
 from semgrid_eval.frames.cityscapes import CAMERA_NAME, find_sequences
 from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
-from semgrid_eval.log.store import find_logs
+from semgrid_eval.log.store import find_logs, label_of
 
 _EXTRA_SOURCES = {"synthetic": "semgrid_eval.cli.convert_synthetic"}
 
@@ -71,8 +71,8 @@ def _strays(out: Path, summary: ConversionSummary, *, all_splits: bool) -> list[
         logs = find_logs(out)
     except InputError:  # every recording failed
         return []
-    labels = {log: log.relative_to(out).with_suffix("").as_posix() for log in logs}
-    return [log for log in logs if labels[log] not in known and (all_splits or labels[log].split("/")[0] in splits)]
+    others = [log for log in logs if label_of(log, out) not in known]
+    return [log for log in others if all_splits or label_of(log, out).split("/")[0] in splits]
 
 
 @click.group("convert", cls=_Sources)

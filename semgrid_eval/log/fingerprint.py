@@ -2,8 +2,9 @@
 
 import hashlib
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.executors import Executor, WorkerDied
@@ -11,6 +12,7 @@ from semgrid_eval.files import DIGEST_CHARACTERS, read_json, write_json
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.progress import Progress
 
+R = TypeVar("R")
 KEPT = "fingerprints.json"
 _MESSAGE = struct.Struct("<qQ")
 
@@ -39,11 +41,10 @@ def fingerprints(paths: Sequence[Path], *, executor: Executor, progress: Progres
         LogError: a log cannot be read or is damaged.
     """
     found = [""] * len(paths)
-    for done, (index, outcome) in enumerate(executor.run(fingerprint, paths), start=1):
+    for index, outcome in _outcomes(fingerprint, paths, executor, progress):
         if isinstance(outcome, WorkerDied):
             raise LogError(outcome.reason, path=paths[index])
         found[index] = outcome
-        progress(done, len(paths), paths[index].stem)
     return found
 
 
@@ -60,16 +61,24 @@ def kept_fingerprints(
     """
     kept = _kept(cache / KEPT)
     missing = [digest for digest in logs if digest not in kept]
-    work = executor.run(_fingerprint_if_sound, [logs[digest] for digest in missing])
     try:
-        for done, (index, outcome) in enumerate(work, start=1):
+        for index, outcome in _outcomes(
+            _fingerprint_if_sound, [logs[digest] for digest in missing], executor, progress
+        ):
             if isinstance(outcome, str):
                 kept[missing[index]] = outcome
-            progress(done, len(missing), logs[missing[index]].stem)
     finally:
         if missing:
             write_json(cache / KEPT, kept)
     return {digest: kept[digest] for digest in logs if digest in kept}
+
+
+def _outcomes(
+    function: Callable[[Path], R], paths: Sequence[Path], executor: Executor, progress: Progress
+) -> Iterator[tuple[int, R | WorkerDied]]:
+    for done, (index, outcome) in enumerate(executor.run(function, paths), start=1):
+        yield index, outcome
+        progress(done, len(paths), paths[index].stem)
 
 
 def _kept(path: Path) -> dict[str, str]:

@@ -34,6 +34,11 @@ def find_logs(folder: Path) -> list[Path]:
     return found
 
 
+def label_of(log: Path, folder: Path) -> str:
+    """Return what a conversion into a folder calls a log of it: its split and name, its path without the ending."""
+    return log.relative_to(folder).with_suffix("").as_posix()
+
+
 def _walk(folder: Path, seen: set[Path]) -> Iterator[Path]:
     """Find logs in a folder and those below it, each folder once, however links lead to it."""
     for path in sorted(folder.iterdir()) if folder.is_dir() else ():

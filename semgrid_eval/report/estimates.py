@@ -90,10 +90,9 @@ def weighted_sum(parts: Sequence[tuple[float, RowScores]], column: str) -> Estim
 def score_columns(counts: Counts) -> Array:
     """Score pooled counts (..., C, C) -> (..., Q) in the order of `COLUMNS`."""
     classes = class_iou(counts)
-    categories, merged = category_iou(classes), merged_category_iou(counts)
-    parts = [categories[name] for name in CATEGORY_COLUMNS] + [
-        merged[name.removeprefix("merged_")] for name in MERGED_COLUMNS
-    ]
+    merged = {f"merged_{name}": values for name, values in merged_category_iou(counts).items()}
+    found = category_iou(classes) | merged
+    parts = [found[name] for name in (*CATEGORY_COLUMNS, *MERGED_COLUMNS)]
     return np.concatenate([classes, np.stack(parts, axis=-1)], axis=-1)
 
 

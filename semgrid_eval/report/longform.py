@@ -38,11 +38,11 @@ def _long(scores: Sequence[RowScores], names: tuple[str, ...], kind: str) -> pd.
     lines = []
     for entry in scores:
         record = entry.row.record
+        key = (entry.row.name, record.experiment, record.model)
         for result, values in zip(entry.row.results, entry.by_seed, strict=True):
             cells, seed = target_cells(result.counts), result.record.seed
             for name in names:
                 iou = values[COLUMNS.index(name)]
-                key = (entry.row.name, record.experiment, record.model)
                 lines.append((*key, name, iou, len(result.counts), cells[name], seed))
     table = pd.DataFrame(lines, columns=["row", "experiment", "model", kind, "iou", "windows", "cells", "seed"])
     return table.astype({"iou": "float64", "windows": "int64", "cells": "int64", "seed": "Int64"})

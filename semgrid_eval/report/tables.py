@@ -57,9 +57,9 @@ def category_values(scores: Scores) -> Table:
 def merged_values(scores: Scores) -> Table:
     """Show the categories with their classes merged before counting."""
     caption = (
-        "Category scores after merging the classes of a category, as the Cityscapes benchmark does. It leaves void out,"
+        "Category scores after merging the classes of a category, as the Cityscapes benchmark does. "
+        "It leaves void out, as Static (known, merged) leaves out unknown."
     )
-    caption += " as Static (known, merged) leaves out unknown."
     return value_table("merged", caption, scores, MERGED_COLUMNS)
 
 

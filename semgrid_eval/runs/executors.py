@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from semgrid_eval.errors import InputError, MissingExtraError
+from semgrid_eval.errors import InputError, MissingExtraError, first_line
 from semgrid_eval.executors import NoRoomError, WorkerDied, thread_variables
 
 T = TypeVar("T")
@@ -83,7 +83,7 @@ class RayExecutor:
         except NoRoomError as error:
             return WorkerDied(str(error.cause))  # type: ignore[attr-defined] # Ray's copy has the original as its cause
         except tuple(getattr(self._ray.exceptions, name) for name in _LOST) as error:
-            return WorkerDied(str(error).partition("\n")[0])
+            return WorkerDied(first_line(error))
 
     def _connect(self, address: str, local_cpus: int | None) -> None:
         options: dict[str, Any] = {"num_cpus": local_cpus} if address == LOCAL else {"address": address}

@@ -255,10 +255,9 @@ def _attempt(worker: Worker, unit: Unit) -> Outcome:
         job = worker.run(unit.row, unit.seed)
     except SemgridError as error:
         return Outcome(None, str(error), {})
-    except (torch.OutOfMemoryError, MemoryError) as error:
-        raise NoRoomError(f"out of memory: {first_line(error)}") from error
-    except RuntimeError as error:  # what torch and its libraries raise; on a CPU, also where memory ends
-        if "allocate memory" in str(error):
+    except (RuntimeError, MemoryError) as error:  # what torch and its libraries raise
+        # On a CPU, torch has no type for it.
+        if isinstance(error, (torch.OutOfMemoryError, MemoryError)) or "allocate memory" in str(error):
             raise NoRoomError(f"out of memory: {first_line(error)}") from error
         return Outcome(None, f"{type(error).__name__}: {first_line(error)}", {})
     return Outcome(job.result_id, None, job.left_out)

@@ -28,8 +28,7 @@ def confusion(target: NDArray[np.uint8], prediction: NDArray[np.uint8], mask: ND
 def class_iou(counts: Counts) -> Scores:
     """Intersection over union of each class: (..., C, C) -> (..., C); NaN where a class is in neither."""
     hits = np.diagonal(counts, axis1=-2, axis2=-1)
-    union = counts.sum(axis=-1) + counts.sum(axis=-2) - hits
-    return np.asarray(np.divide(hits, union, out=np.full(union.shape, np.nan), where=union > 0))
+    return _divided(hits, counts.sum(axis=-1) + counts.sum(axis=-2) - hits)
 
 
 def category_iou(iou: Scores) -> dict[str, Scores]:
@@ -64,13 +63,16 @@ def _merged_iou(counts: Counts, classes: tuple[int, ...]) -> Scores:
     ids = list(classes)
     target, predicted = counts[..., ids, :], counts[..., :, ids]
     hits = target[..., ids].sum(axis=(-2, -1))
-    union = target.sum(axis=(-2, -1)) + predicted.sum(axis=(-2, -1)) - hits
-    return np.asarray(np.divide(hits, union, out=np.full(union.shape, np.nan), where=union > 0))
+    return _divided(hits, target.sum(axis=(-2, -1)) + predicted.sum(axis=(-2, -1)) - hits)
 
 
 def mean_finite(values: Scores, *, axis: int = -1) -> Scores:
     """Mean of the values along an axis that are there, NaN where none is."""
     present = np.isfinite(values)
     total = np.where(present, values, 0.0).sum(axis=axis)
-    number = present.sum(axis=axis)
-    return np.asarray(np.divide(total, number, out=np.full(total.shape, np.nan), where=number > 0))
+    return _divided(total, present.sum(axis=axis))
+
+
+def _divided(part: Scores | Counts, whole: Counts) -> Scores:
+    """Divide, NaN where there is nothing to divide by."""
+    return np.asarray(np.divide(part, whole, out=np.full(whole.shape, np.nan), where=whole > 0))
