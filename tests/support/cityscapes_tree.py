@@ -8,7 +8,10 @@ from typing import Any
 
 import cv2
 import numpy as np
+import pytest
 
+from semgrid_eval.errors import InputError
+from semgrid_eval.frames.cityscapes import find_sequences
 from semgrid_eval.frames.png import encode_gray
 
 FRAME_NS = 58_823_529
@@ -97,3 +100,21 @@ def change_json(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
     value = json.loads(path.read_bytes())
     change(value)
     put_json(path, value)
+
+
+def only(tree, **options):
+    """Find the only sequence of a tree."""
+    (sequence,) = find_sequences(tree.root, **options)
+    return sequence
+
+
+def frames(sequence):
+    """Convert a sequence; its frames of the one camera."""
+    return [moment.cameras["front"] for moment in sequence.recording().moments()]
+
+
+def fault(tree, **options):
+    """The message of the first error that converting the only sequence gives."""
+    with pytest.raises(InputError) as caught:
+        list(only(tree, **options).recording().moments())
+    return str(caught.value)
