@@ -13,7 +13,7 @@ from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.cli.main import cli
 from semgrid_eval.models.predictor import load_predictor
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.sequences.dataset import WindowBatch
+from semgrid_eval.windows.data import WindowBatch
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

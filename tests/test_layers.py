@@ -9,31 +9,34 @@ import semgrid_eval
 ROOT = Path(semgrid_eval.__file__).parent
 FLOORS = [
     "ground",
-    "frames",
+    "recording",
     "log",
     "segmentation",
+    "sources",
+    "sensors",
     "grids",
-    "sequences",
+    "windows",
     "models",
     "scores",
     "runs",
+    "playback",
     "report",
     "bench",
     "cli",
 ]
 ALLOWED_IN = {
-    "mcap": {"log"},
-    "google": {"log"},
-    "foxglove_schemas_protobuf": {"log"},
+    "mcap": {"log", "playback"},
+    "google": {"log", "playback"},
+    "foxglove_schemas_protobuf": {"log", "playback"},
     "onnxruntime": {"segmentation"},
-    "torch": {"sequences", "models", "scores", "runs", "bench"},
+    "torch": {"windows", "models", "scores", "runs", "bench"},
     "click": {"cli"},
     "rich": {"cli"},
-    "ray": {"runs"},
+    "ray": {"ground"},
     "jinja2": {"report"},
     "matplotlib": {"report"},
-    "sumo": {"frames"},
-    "trimesh": {"frames"},
+    "sumo": {"sources"},
+    "trimesh": {"sources"},
 }
 
 
@@ -77,9 +80,9 @@ def test_packages_stay_on_their_floor():
 
 
 def test_report_reads_files_and_needs_neither_torch_nor_runs():
-    forbidden = ("torch", "semgrid_eval.runs", "semgrid_eval.models", "semgrid_eval.sequences")
+    forbidden = ("torch", "semgrid_eval.runs", "semgrid_eval.models", "semgrid_eval.windows")
     allowed = tuple(
-        f"semgrid_eval.scores.{name}" for name in ("results", "iou", "pictures", "statistics", "calibration")
+        f"semgrid_eval.scores.{name}" for name in ("results", "iou", "thumbnails", "statistics", "calibration")
     )
     for floor, path in modules():
         if floor == "report":

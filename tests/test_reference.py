@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from support.fake_run import make_fake_run
 
 from semgrid_eval.cli.main import cli
-from semgrid_eval.report.page import write_report
+from semgrid_eval.report.page.write import write_report
 
 ROOT = Path(__file__).parents[1]
 

@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, LABEL_ID, UNKNOWN
 from semgrid_eval.errors import SemgridError
-from semgrid_eval.frames.png import decode_gray
-from semgrid_eval.frames.types import CameraFrame
 from semgrid_eval.grids.build import GridRecording, build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import LogReader, find_logs
-from semgrid_eval.sequences.dataset import shift_grids, shift_in_cells
+from semgrid_eval.recording.png import decode_gray
+from semgrid_eval.recording.types import CameraFrame
+from semgrid_eval.windows.data import shift_grids, shift_in_cells
 
 RANGES_M = ((0, 10), (10, 20), (20, 30), (30, 40), (40, 60))
 STEP_S = 0.3

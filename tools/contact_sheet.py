@@ -15,10 +15,10 @@ from PIL import Image
 
 from semgrid_eval.classes import class_palette, label_palette
 from semgrid_eval.files import atomic_file
-from semgrid_eval.frames.png import decode_gray
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import LogReader, find_logs
+from semgrid_eval.recording.png import decode_gray
 
 LOGS = 6
 HEIGHT_PX = 192

@@ -11,8 +11,7 @@ from pathlib import Path
 from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.executors import available_cores, local_executor
 from semgrid_eval.files import write_json
-from semgrid_eval.frames.synthetic.benchmark import versions
-from semgrid_eval.frames.synthetic.published import (
+from semgrid_eval.log.benchmarks import (
     BENCHMARKS,
     SIZES,
     benchmark_digest,
@@ -23,6 +22,7 @@ from semgrid_eval.frames.synthetic.published import (
 from semgrid_eval.log.fingerprint import fingerprints
 from semgrid_eval.log.store import LogReader, find_logs, label_of
 from semgrid_eval.progress import silent
+from semgrid_eval.sources.town.benchmark import versions
 
 
 def freeze(out: Path) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from semgrid_eval.files import write_text
-from semgrid_eval.report.provenance import data_sets
+from semgrid_eval.report.page.provenance import data_sets
 from semgrid_eval.scores.results import ResultRecord, RunRecord, read_result, read_run, result_folder
 
 README = """# {title}

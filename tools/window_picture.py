@@ -12,7 +12,7 @@ from PIL import Image
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file
-from semgrid_eval.report.pictures import grid_png
+from semgrid_eval.report.examples.drawing import grid_png
 from semgrid_eval.scores.results import read_predictions, read_result, read_run, read_windows, result_folder
 
 WINDOWS = 4

@@ -9,19 +9,19 @@ import numpy as np
 
 from semgrid_eval.bench.measurement import Settings
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.frames.synthetic.recordings import (
+from semgrid_eval.grids.build import GridRecording
+from semgrid_eval.log.benchmarks import Stereo
+from semgrid_eval.log.store import write_log
+from semgrid_eval.progress import silent
+from semgrid_eval.recording.types import Recording
+from semgrid_eval.sources.town.recordings import (
     RecordingPlan,
     SyntheticConfig,
     plan_recordings,
     render_recording,
 )
-from semgrid_eval.frames.synthetic.rig import Stereo
-from semgrid_eval.frames.types import Recording
-from semgrid_eval.grids.build import GridRecording
-from semgrid_eval.log.store import write_log
-from semgrid_eval.progress import silent
-from semgrid_eval.sequences.dataset import WindowSet, select_windows, stack_recordings
-from semgrid_eval.sequences.windows import WindowConfig, training_windows
+from semgrid_eval.windows.data import WindowSet, select_windows, stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 _CELLS, _CELL_M, _FRAMES, _FRAME_NS = 128, 100 / 128, 30, 58_823_529
 _COARSE = 8  # cells of a random patch

@@ -12,7 +12,7 @@ from torch.nn import functional as F
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.models.network import NetworkConfig, seeded_network
 from semgrid_eval.models.training import masked_loss
-from semgrid_eval.sequences.dataset import WindowSet
+from semgrid_eval.windows.data import WindowSet
 
 
 def train_by_the_book(

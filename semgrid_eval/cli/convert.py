@@ -8,9 +8,9 @@ import click
 from semgrid_eval.cli.console import progress, say
 from semgrid_eval.cli.work import chosen_executor, executor_options, workers_option
 from semgrid_eval.errors import InputError, MissingExtraError
-from semgrid_eval.frames.cityscapes import CAMERA_NAME, find_sequences
 from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
 from semgrid_eval.log.store import find_logs, label_of
+from semgrid_eval.sources.cityscapes.tree import CAMERA_NAME, find_sequences
 
 _EXTRA_SOURCES = {"synthetic": "semgrid_eval.cli.convert_synthetic"}
 

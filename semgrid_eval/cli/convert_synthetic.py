@@ -12,19 +12,19 @@ from semgrid_eval.cli.convert import show
 from semgrid_eval.cli.work import chosen_executor, executor_options, workers_option
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
-from semgrid_eval.frames.synthetic.benchmark import changed_versions
-from semgrid_eval.frames.synthetic.published import (
+from semgrid_eval.log.benchmarks import (
     BENCHMARKS,
     SIZES,
     Benchmark,
     Comparison,
     SizeName,
+    Stereo,
     load_benchmark,
 )
-from semgrid_eval.frames.synthetic.recordings import SyntheticConfig
-from semgrid_eval.frames.synthetic.rig import Stereo
 from semgrid_eval.log.convert import ConversionSummary
-from semgrid_eval.log.town import convert_benchmark, convert_town
+from semgrid_eval.sources.town.benchmark import changed_versions
+from semgrid_eval.sources.town.convert import convert_benchmark, convert_town
+from semgrid_eval.sources.town.recordings import SyntheticConfig
 
 _Command = Callable[..., Any]
 _DEFAULTS = {name: field.default for name, field in SyntheticConfig.model_fields.items()}

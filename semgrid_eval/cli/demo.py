@@ -28,11 +28,11 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
     """
     from semgrid_eval.cli.convert import show
     from semgrid_eval.cli.run import show_run
-    from semgrid_eval.frames.synthetic.recordings import SyntheticConfig
-    from semgrid_eval.log.town import convert_town
-    from semgrid_eval.report.page import write_report
+    from semgrid_eval.report.page.write import write_report
     from semgrid_eval.runs.matrix import load_matrix
     from semgrid_eval.runs.runner import RunOptions, run_matrix
+    from semgrid_eval.sources.town.convert import convert_town
+    from semgrid_eval.sources.town.recordings import SyntheticConfig
 
     start_s = time.monotonic()
     logs, run = out / "logs", out / "run"

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import progress, say
-from semgrid_eval.runs.playback import write_playback
+from semgrid_eval.playback.write import write_playback
 
 
 @click.command("play", epilog="Example: semgrid-eval play runs/first BL-DC --out play.mcap --logs logs")

@@ -15,7 +15,7 @@ def command(runs: tuple[Path, ...], out: Path | None) -> None:
 
     Prints the path of the page. Several runs are shown side by side, with their differences.
     """
-    from semgrid_eval.report.page import write_report  # here, so that `--help` does not wait for matplotlib
+    from semgrid_eval.report.page.write import write_report  # here, so that `--help` does not wait for matplotlib
 
     with progress("reading results") as shown:
         page = write_report(runs, out, progress=shown)

@@ -9,7 +9,7 @@ import click
 from semgrid_eval.cli.console import command_line, progress, say
 from semgrid_eval.cli.work import chosen_executor, device_option, executor_options, workers_option
 from semgrid_eval.executors import local_executor
-from semgrid_eval.runs.executors import LOCAL
+from semgrid_eval.ray_executor import LOCAL
 
 if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.runs.matrix import Matrix

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import click
 
 from semgrid_eval.executors import Executor, available_cores, local_executor
-from semgrid_eval.runs.executors import LOCAL, RayExecutor
+from semgrid_eval.ray_executor import LOCAL, RayExecutor
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

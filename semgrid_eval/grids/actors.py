@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import LogError
-from semgrid_eval.frames.types import Actor, Pose
 from semgrid_eval.grids.spec import MOVING, STANDING, GridSpec
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.log.topics import TRUE_ACTORS
+from semgrid_eval.recording.types import Actor, Pose
 
 MOVING_FROM_MPS = 0.5
 MARGIN_CELLS = 1

@@ -14,8 +14,6 @@ from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.errors import LogError, ResultError, SemgridError
 from semgrid_eval.executors import Executor, InProcess, WorkerDied
 from semgrid_eval.files import digest_value
-from semgrid_eval.frames.png import decode_gray
-from semgrid_eval.frames.types import CameraFrame, MotionSample
 from semgrid_eval.grids.actors import TrueActors
 from semgrid_eval.grids.geometry import GroundRays, ground_rays, nearest_indices
 from semgrid_eval.grids.motion import integrate_motion
@@ -23,6 +21,8 @@ from semgrid_eval.grids.rasterise import LabelledImage, count_points, rasterise
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.progress import Progress, silent
+from semgrid_eval.recording.png import decode_gray
+from semgrid_eval.recording.types import CameraFrame, MotionSample
 
 FORMAT_VERSION = 2
 

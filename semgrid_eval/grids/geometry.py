@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.frames.types import CameraCalibration
+from semgrid_eval.recording.types import CameraCalibration
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.frames.types import MotionSample
+from semgrid_eval.recording.types import MotionSample
 
 Floats = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from semgrid_eval.classes import CITYSCAPES_LABELS
 from semgrid_eval.errors import InputError, LogError
-from semgrid_eval.frames.png import decode_gray, read_header
-from semgrid_eval.frames.types import CameraCalibration, CameraFrame, MotionSample
 from semgrid_eval.log import topics
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.recording.png import decode_gray, read_header
+from semgrid_eval.recording.types import CameraCalibration, CameraFrame, MotionSample
 
 # What a road vehicle and its stereo camera can plausibly be; outside lies a unit or sign error, or a broken sensor.
 FOCAL_PER_WIDTH = (0.2, 5.0)

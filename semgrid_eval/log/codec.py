@@ -12,12 +12,12 @@ from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from semgrid_eval.frames.types import Actor, CameraCalibration, MotionSample, Pose
 from semgrid_eval.log.schemas.actors_pb2 import Actor as ActorMessage
 from semgrid_eval.log.schemas.actors_pb2 import Actors
 from semgrid_eval.log.schemas.egomotion_pb2 import Egomotion
 from semgrid_eval.log.schemas.stereo_calibration_pb2 import CameraExtrinsics, StereoCalibration
 from semgrid_eval.log.topics import BASE_FRAME, GRID_FRAME, MAP_FRAME, ODOM_FRAME, optical_frame
+from semgrid_eval.recording.types import Actor, CameraCalibration, MotionSample, Pose
 
 _NS_PER_S = 1_000_000_000
 _GPS_FIELDS = ("latitude_deg", "longitude_deg", "heading_deg")

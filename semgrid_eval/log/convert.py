@@ -8,9 +8,9 @@ from pathlib import Path
 
 from semgrid_eval.errors import InputError, LogError, SemgridError
 from semgrid_eval.executors import Executor, WorkerDied
-from semgrid_eval.frames.types import Recording
 from semgrid_eval.log.store import SUFFIX, LogReader, write_log
 from semgrid_eval.progress import Progress
+from semgrid_eval.recording.types import Recording
 
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 

@@ -7,12 +7,12 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
 from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError
-from semgrid_eval.frames.png import read_header, with_palette
-from semgrid_eval.frames.types import Actor, CameraFrame, Moment, MotionSample, Pose, Recording
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.motion import DeadReckoning
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.log.writer import MessageWriter
+from semgrid_eval.recording.png import read_header, with_palette
+from semgrid_eval.recording.types import Actor, CameraFrame, Moment, MotionSample, Pose, Recording
 
 
 class MomentWriter:

@@ -2,7 +2,7 @@
 
 import math
 
-from semgrid_eval.frames.types import MotionSample, Pose
+from semgrid_eval.recording.types import MotionSample, Pose
 
 _NS_PER_S = 1e9
 

@@ -10,13 +10,13 @@ from typing import Self, TypeVar
 
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.files import atomic_file
-from semgrid_eval.frames.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Recording
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.container import Container, Entry, damage_as_log_error
 from semgrid_eval.log.moments import MomentWriter, camera_frame, moment_topics, read_moments, read_picture
 from semgrid_eval.log.scene import RECORD, Scene
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.log.writer import MessageWriter
+from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Recording
 
 SUFFIX = ".mcap"
 T = TypeVar("T")

@@ -6,7 +6,7 @@ from torch import Tensor
 from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.predictor import one_hot
-from semgrid_eval.sequences.dataset import WindowBatch
+from semgrid_eval.windows.data import WindowBatch
 
 
 def overlay(grids: Tensor) -> Tensor:

@@ -18,7 +18,7 @@ from semgrid_eval.classes import CLASSES, UNKNOWN, Category
 from semgrid_eval.config import Config
 from semgrid_eval.models.baselines import overlay
 from semgrid_eval.models.predictor import one_hot
-from semgrid_eval.sequences.dataset import WindowBatch
+from semgrid_eval.windows.data import WindowBatch
 
 Grid = NDArray[np.uint8]
 Cells = NDArray[np.int64]

@@ -16,7 +16,7 @@ from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.files import atomic_file
 from semgrid_eval.models.device import seeded
-from semgrid_eval.sequences.dataset import WindowBatch
+from semgrid_eval.windows.data import WindowBatch
 
 Preset = Literal["keras", "torch"]
 Activation = Literal["linear", "relu"]

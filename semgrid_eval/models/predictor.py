@@ -11,7 +11,7 @@ from torch import Tensor
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.errors import InputError
-from semgrid_eval.sequences.dataset import WindowBatch
+from semgrid_eval.windows.data import WindowBatch
 
 _beside: Path | None = None  # folder of the model's file that was loaded last
 ENTRY_POINT_GROUP = "semgrid_eval.models"

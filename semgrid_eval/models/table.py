@@ -5,7 +5,7 @@ from torch import Tensor
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.models.baselines import newest_first
-from semgrid_eval.sequences.dataset import WindowBatch, WindowSet
+from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 GRID_LIMIT = 5
 """Grids that a table looks at, the newest ones: it has 10 to the power of their number rows."""

@@ -27,7 +27,7 @@ from semgrid_eval.models.network import (
     seeded_network,
 )
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.sequences.dataset import WindowBatch, WindowSet
+from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 _IGNORED = -100
 _REPORT_INTERVAL_S = 0.5

@@ -17,7 +17,7 @@ from semgrid_eval.models.network import NetworkConfig
 from semgrid_eval.models.predictor import installed_models
 from semgrid_eval.models.training import TrainingConfig
 from semgrid_eval.scores.evaluate import MaskMode
-from semgrid_eval.sequences.windows import WindowConfig
+from semgrid_eval.windows.plan import WindowConfig
 
 TRAINED_MODEL = "ed"
 BASELINES = {

@@ -23,7 +23,7 @@ from semgrid_eval.runs.sources import Sources
 from semgrid_eval.runs.thumbnails import keep_pictures
 from semgrid_eval.runs.unit import Worker, identity
 from semgrid_eval.scores import results
-from semgrid_eval.sequences.dataset import WindowSet
+from semgrid_eval.windows.data import WindowSet
 
 
 @dataclass(frozen=True)

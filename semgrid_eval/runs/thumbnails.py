@@ -10,16 +10,16 @@ import numpy as np
 from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError, LogError, ResultError, SemgridError
 from semgrid_eval.executors import Executor
-from semgrid_eval.frames.png import decode_colour, decode_ids, encode_gray, read_header, with_palette
 from semgrid_eval.grids.geometry import nearest_indices, unit_projection
 from semgrid_eval.log import topics
 from semgrid_eval.log.container import damage_as_log_error
-from semgrid_eval.log.drive import drive_poses
 from semgrid_eval.log.moments import read_picture
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.playback.drive import drive_poses
 from semgrid_eval.progress import Stage
-from semgrid_eval.scores.pictures import (
+from semgrid_eval.recording.png import decode_colour, decode_ids, encode_gray, read_header, with_palette
+from semgrid_eval.scores.thumbnails import (
     Drive,
     FramePictures,
     LogPictures,
@@ -29,7 +29,7 @@ from semgrid_eval.scores.pictures import (
 )
 
 if TYPE_CHECKING:  # processes that only shrink pictures need no torch
-    from semgrid_eval.sequences.dataset import WindowSet
+    from semgrid_eval.windows.data import WindowSet
 
 WIDTH_PX = 256
 WEBP_QUALITY = 75

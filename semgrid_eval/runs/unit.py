@@ -25,8 +25,8 @@ from semgrid_eval.runs.matrix import Row
 from semgrid_eval.runs.sources import Sources, grid_digest
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
-from semgrid_eval.sequences.dataset import WindowSet, select_windows, window_arrays
-from semgrid_eval.sequences.windows import WindowConfig, WindowPlan, training_windows, validation_windows
+from semgrid_eval.windows.data import WindowSet, select_windows, window_arrays
+from semgrid_eval.windows.plan import WindowConfig, WindowPlan, training_windows, validation_windows
 
 SCORING_VERSION = 2
 """Counts changes to how windows are kept and scored; results of another version are made anew."""

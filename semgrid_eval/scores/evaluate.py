@@ -14,7 +14,7 @@ from semgrid_eval.grids.spec import MOVING, STANDING
 from semgrid_eval.models.predictor import Predictor
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores.iou import Counts, confusion
-from semgrid_eval.sequences.dataset import WindowBatch, WindowSet
+from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 MaskMode = Literal["exclude", "substitute", "off"]
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from semgrid_eval.config import Config
-from semgrid_eval.frames.png import MAX_PIXELS
+from semgrid_eval.recording.png import MAX_PIXELS
 
 Channels = tuple[float, float, float]
 Spread = Annotated[float, Field(gt=0)]

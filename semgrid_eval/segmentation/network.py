@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import CITYSCAPES_LABELS, label_ids_from_train_ids
 from semgrid_eval.errors import InputError, MissingExtraError
 from semgrid_eval.executors import available_cores
-from semgrid_eval.frames.png import MAX_PIXELS
+from semgrid_eval.recording.png import MAX_PIXELS
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.pixels import Size, best_class, nearest, network_input, size_of
 

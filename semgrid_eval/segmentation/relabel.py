@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.executors import Executor
 from semgrid_eval.files import digest_files, digest_value
-from semgrid_eval.frames.png import decode_colour, encode_gray
-from semgrid_eval.frames.types import CameraFrame, Moment, Recording
 from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
 from semgrid_eval.log.store import LogReader, find_logs, read_recording
 from semgrid_eval.progress import Progress
+from semgrid_eval.recording.png import decode_colour, encode_gray
+from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.network import SegmentationNetwork
 

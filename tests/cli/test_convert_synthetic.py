@@ -10,11 +10,11 @@ from support.towns import SMALL, town_cache
 from semgrid_eval.cli import convert_synthetic
 from semgrid_eval.cli.convert_synthetic import synthetic
 from semgrid_eval.cli.main import cli, main
-from semgrid_eval.frames.synthetic import sumo
-from semgrid_eval.frames.synthetic.benchmark import versions
-from semgrid_eval.frames.synthetic.published import BenchmarkSize, SplitSize, load_benchmark
+from semgrid_eval.log.benchmarks import BenchmarkSize, SplitSize, load_benchmark
 from semgrid_eval.log.fingerprint import fingerprint
 from semgrid_eval.log.store import LogReader, find_logs
+from semgrid_eval.sources.town import sumo
+from semgrid_eval.sources.town.benchmark import versions
 
 LABELS = ("train/town00_000000_000000", "val/town01_000001_000000")
 

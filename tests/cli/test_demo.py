@@ -7,10 +7,10 @@ from support.toy_world import street
 
 from semgrid_eval.cli.main import cli
 from semgrid_eval.errors import ConfigError
-from semgrid_eval.log import town
 from semgrid_eval.log.convert import ConversionSummary
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs import matrix
+from semgrid_eval.sources.town import convert as town
 
 ROWS = [{"name": "BL-DC", "model": "newest"}, {"name": "BL-broken", "model": "absent.py:Model"}]
 

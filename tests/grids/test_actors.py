@@ -11,11 +11,11 @@ from support.toy_world import FRAME_NS, Box, ToyWorld, street
 
 from semgrid_eval.classes import CLASS_NAMES, LABEL_ID
 from semgrid_eval.errors import LogError
-from semgrid_eval.frames.types import Actor, Pose
 from semgrid_eval.grids.actors import MOVING_FROM_MPS, boxes_in_grid, draw_boxes
 from semgrid_eval.grids.build import build_grids, build_log
 from semgrid_eval.grids.spec import MOVING, STANDING, GridConfig, GridSpec
 from semgrid_eval.log.store import write_log
+from semgrid_eval.recording.types import Actor, Pose
 
 CAR = CLASS_NAMES.index("car")
 SPEC = GridSpec(rows=24, columns=20, cell_m=0.5, agent_row=20, agent_column=11)

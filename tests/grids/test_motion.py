@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.frames.types import MotionSample
 from semgrid_eval.grids.motion import integrate_motion
+from semgrid_eval.recording.types import MotionSample
 
 
 def samples_of(stamps_ns, speeds, yaw_rates):

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from support.driving import CALIBRATION, FRAME_NS, driving
 
-from semgrid_eval.frames.png import encode_gray
 from semgrid_eval.log.check import Severity, check_log
 from semgrid_eval.log.store import write_log
+from semgrid_eval.recording.png import encode_gray
 
 # Every frame of this recording has all pictures, and nothing about it is odd.
 

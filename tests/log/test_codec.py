@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 from support.driving import CALIBRATION, START_NS
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.frames.types import CameraCalibration, MotionSample, Pose
 from semgrid_eval.log import codec
+from semgrid_eval.recording.types import CameraCalibration, MotionSample, Pose
 
 ANGLES = st.floats(-3.0, 3.0)
 

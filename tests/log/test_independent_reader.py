@@ -8,8 +8,8 @@ from support.cityscapes_tree import Tree
 from support.driving import driving
 from support.independent_reader import of_topic, read, reader_script, sha256
 
-from semgrid_eval.frames.cityscapes import find_sequences
 from semgrid_eval.log.store import write_log
+from semgrid_eval.sources.cityscapes.tree import find_sequences
 
 
 @pytest.fixture(scope="module")

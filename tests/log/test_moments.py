@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 from support.driving import FRAME_NS, START_NS, driving
 
 from semgrid_eval.errors import LogError
-from semgrid_eval.frames.types import Pose
 from semgrid_eval.log import codec
 from semgrid_eval.log.store import LogReader, read_recording, write_log
+from semgrid_eval.recording.types import Pose
 
 
 def rewritten(recording, path):

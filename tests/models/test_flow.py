@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.models.baselines import FuseAll
 from semgrid_eval.models.flow import MOVABLE, FlowConfig, MoveOn, find_moves
-from semgrid_eval.sequences.dataset import WindowBatch
+from semgrid_eval.windows.data import WindowBatch
 
 UNKNOWN, ROAD, BUILDING, CAR, PERSON = (
     CLASS_NAMES.index(name) for name in ("unknown", "road", "building", "car", "person")

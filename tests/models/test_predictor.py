@@ -8,8 +8,8 @@ from support.recordings import random_recording
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.predictor import ENTRY_POINT_GROUP, CheckedPredictor, load_predictor, one_hot
-from semgrid_eval.sequences.dataset import select_windows, stack_recordings
-from semgrid_eval.sequences.windows import Window
+from semgrid_eval.windows.data import select_windows, stack_recordings
+from semgrid_eval.windows.plan import Window
 
 OWN_MODEL = """
 import torch

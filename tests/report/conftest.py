@@ -4,7 +4,7 @@ import pytest
 from support.fake_run import HOSTILE, FakeRow, make_fake_run
 from support.seen_run import make_seen_run
 
-from semgrid_eval.report.page import write_report
+from semgrid_eval.report.page.write import write_report
 from semgrid_eval.scores.results import read_run, result_folder, write_run
 
 

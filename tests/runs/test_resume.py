@@ -5,7 +5,7 @@ from support.killable import run_here
 from support.toy_world import street
 
 from semgrid_eval.log.store import write_log
-from semgrid_eval.report.page import write_report
+from semgrid_eval.report.page.write import write_report
 
 KILLS = 20
 MATRIX = """

@@ -12,9 +12,9 @@ from support.toy_world import street
 from semgrid_eval.classes import CLASS_NAMES, LABEL_ID
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.executors import Processes
-from semgrid_eval.frames.types import Actor, Pose
 from semgrid_eval.log.store import write_log
 from semgrid_eval.models.predictor import ENTRY_POINT_GROUP
+from semgrid_eval.recording.types import Actor, Pose
 from semgrid_eval.scores import results
 from semgrid_eval.scores.iou import category_iou, class_iou
 

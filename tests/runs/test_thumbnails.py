@@ -11,13 +11,13 @@ from support.toy_world import FRAME_NS, HEIGHT, WIDTH, png, street
 from semgrid_eval.classes import LABEL_ID, label_palette
 from semgrid_eval.errors import LogError
 from semgrid_eval.executors import InProcess, Processes
-from semgrid_eval.frames.png import decode_ids
 from semgrid_eval.log.store import LogReader, write_log
+from semgrid_eval.recording.png import decode_ids
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.runs.thumbnails import log_pictures, small_image, small_label
 from semgrid_eval.scores import results
-from semgrid_eval.scores.pictures import FramePictures, pictures_file, read_pictures
+from semgrid_eval.scores.thumbnails import FramePictures, pictures_file, read_pictures
 
 START_NS = 10**18
 SHORT = {"name": "BL-DC", "model": "newest", "window": {"step_frames": 3, "target_frame": 8}}

@@ -9,8 +9,8 @@ from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.baselines import RepeatNewest
 from semgrid_eval.scores.evaluate import evaluate
-from semgrid_eval.sequences.dataset import select_windows, stack_recordings, window_arrays
-from semgrid_eval.sequences.windows import WindowConfig, validation_windows
+from semgrid_eval.windows.data import select_windows, stack_recordings, window_arrays
+from semgrid_eval.windows.plan import WindowConfig, validation_windows
 
 
 def windows_of(*recordings):

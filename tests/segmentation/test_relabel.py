@@ -13,9 +13,9 @@ from support.onnx_models import FLAT, colour_network
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import local_executor
-from semgrid_eval.frames.png import decode_gray
 from semgrid_eval.log.store import LogReader, find_logs, read_recording, write_log
 from semgrid_eval.progress import silent
+from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.relabel import RECORD, segment_logs
 

@@ -2,7 +2,7 @@
 
 import math
 
-from semgrid_eval.frames.types import CameraCalibration
+from semgrid_eval.recording.types import CameraCalibration
 
 
 def calibration(**changes) -> CameraCalibration:

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.frames.cityscapes import find_sequences
-from semgrid_eval.frames.png import encode_gray
+from semgrid_eval.recording.png import encode_gray
+from semgrid_eval.sources.cityscapes.tree import find_sequences
 
 FRAME_NS = 58_823_529
 CAMERA = {

@@ -9,7 +9,7 @@ from PIL import Image
 from support.driving import driving
 
 from semgrid_eval.classes import LABEL_ID
-from semgrid_eval.frames.types import Moment, Recording
+from semgrid_eval.recording.types import Moment, Recording
 
 TRAIN_COLOURS = {0: (1.0, 0.0, 0.0), 13: (0.0, 0.0, 1.0)}
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from semgrid_eval.frames.png import encode_gray
-from semgrid_eval.frames.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Recording
+from semgrid_eval.recording.png import encode_gray
+from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Recording
 
 FRAME_NS = 58_823_529
 START_NS = 1_700_000_000_123_456_789

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
 from semgrid_eval.files import digest_value
-from semgrid_eval.report.reading import Result, Row
+from semgrid_eval.report.rows.load import Result, Row
 from semgrid_eval.scores import results
 from semgrid_eval.scores.iou import confusion
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from semgrid_eval.classes import LABEL_ID
-from semgrid_eval.frames.types import CameraCalibration, CameraFrame, Moment, MotionSample, Recording
+from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment, MotionSample, Recording
 
 WIDTH, HEIGHT = 256, 128
 FRAME_NS = 58_823_529  # 17 Hz

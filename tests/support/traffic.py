@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from semgrid_eval.frames.synthetic.traffic import Traffic
+from semgrid_eval.sources.town.traffic import Traffic
 
 STEP_S = 0.059
 

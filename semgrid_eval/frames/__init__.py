@@ -1,1 +1,0 @@
-"""Sources: where calibrated camera frames and motion come from."""

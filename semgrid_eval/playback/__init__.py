@@ -1,0 +1,1 @@
+"""A run as an MCAP log to play in a viewer."""

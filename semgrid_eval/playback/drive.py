@@ -1,0 +1,125 @@
+"""What a viewer wants to see of a log beside grids: pictures, their calibration, and where the vehicle is."""
+
+import heapq
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from google.protobuf.message import Message
+
+from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.log import codec, topics
+from semgrid_eval.log.container import damage_as_log_error
+from semgrid_eval.log.moments import read_picture
+from semgrid_eval.log.motion import DeadReckoning
+from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.recording.png import read_header
+from semgrid_eval.recording.types import Pose
+
+_PICTURES = (topics.IMAGE, topics.LABEL)
+
+
+class Outgoing(NamedTuple):
+    """A message to write, with the arguments of `MessageWriter.write`."""
+
+    log_ns: int
+    topic: str
+    message: Message
+    publish_ns: int | None = None
+    notes: dict[str, str] | None = None
+
+
+class Drive:
+    """The drive that a log holds.
+
+    Args:
+        log: the open log.
+        camera: whose frames count; None takes a log's only one.
+
+    Raises:
+        LogError: the log is damaged, or has no such camera.
+    """
+
+    def __init__(self, log: LogReader, camera: str | None = None) -> None:
+        self.cameras = log.scene.cameras
+        chosen = log.choose_camera(camera)
+        self._log = log
+        self._calibrations = {name: log.calibration(name) for name in self.cameras}
+        self._poses = drive_poses(log, chosen)
+        self._frames = {pose.stamp_ns: frame for frame, pose in enumerate(self._poses)}
+
+    def frame_at(self, stamp_ns: int) -> int:
+        """Return the index of the frame of a time.
+
+        Raises:
+            LogError: there is none.
+        """
+        if stamp_ns not in self._frames:
+            raise LogError(f"has no frame at {stamp_ns} ns", path=self._log.path)
+        return self._frames[stamp_ns]
+
+    def stamp_ns(self, frame: int) -> int:
+        """Return the time of a frame."""
+        return self._poses[frame].stamp_ns
+
+    def yaw_rad(self, frame: int) -> float:
+        """Return where the vehicle points at a frame, in the odom frame."""
+        return self._poses[frame].yaw_rad
+
+    def messages(self, first_ns: int, last_ns: int, *, shift_ns: int, grid_yaw_rad: float) -> Iterator[Outgoing]:
+        """Iterate over transforms, calibrations and pictures from `first_ns` to `last_ns`, all times shifted.
+
+        Raises:
+            LogError: what is read is damaged.
+        """
+        moving = self._transforms(first_ns, last_ns, shift_ns, grid_yaw_rad)
+        return heapq.merge(moving, self._pictures(first_ns, last_ns, shift_ns), key=lambda sent: sent.log_ns)
+
+    def _transforms(self, first_ns: int, last_ns: int, shift_ns: int, grid_yaw_rad: float) -> Iterator[Outgoing]:
+        for pose in self._poses:
+            if first_ns <= pose.stamp_ns <= last_ns:
+                now = Pose(pose.stamp_ns + shift_ns, pose.x_m, pose.y_m, pose.yaw_rad)
+                message = codec.transforms_message(now, self._calibrations, grid_yaw_rad=grid_yaw_rad)
+                yield Outgoing(now.stamp_ns, topics.TRANSFORMS, message)
+
+    def _pictures(self, first_ns: int, last_ns: int, shift_ns: int) -> Iterator[Outgoing]:
+        shown = {camera_topic(name, channel): (name, channel) for name in self.cameras for channel in _PICTURES}
+        notes = dict(topics.PICTURES.values())
+        calibrated: dict[str, int] = {}
+        for topic, stamp_ns, data in self._log.messages(shown):
+            if stamp_ns < first_ns:
+                continue
+            if stamp_ns > last_ns:
+                return
+            (camera, channel), now_ns = shown[topic], stamp_ns + shift_ns
+            with damage_as_log_error(self._log.path):
+                png = read_picture(data)
+            if calibrated.get(camera) != now_ns:
+                calibrated[camera] = now_ns
+                size_px = self._size_px(png, topic)
+                known, _ = codec.calibration_messages(now_ns, camera, self._calibrations[camera], size_px)
+                yield Outgoing(now_ns, camera_topic(camera, topics.CALIBRATION), known)
+            yield Outgoing(now_ns, topic, codec.image_message(now_ns, camera, png), notes=notes[channel])
+
+    def _size_px(self, png: bytes, topic: str) -> tuple[int, int]:
+        try:
+            header = read_header(png)
+        except InputError as error:
+            raise LogError(str(error), path=self._log.path, field=topic) from error
+        return header.width, header.height
+
+
+def drive_poses(log: LogReader, camera: str) -> list[Pose]:
+    """Return the vehicle's pose in the odom frame at each frame of a camera, from the motion known by then.
+
+    Raises:
+        LogError: what is read is damaged.
+    """
+    poses: list[Pose] = []
+    reckoning, samples, known = DeadReckoning(), log.motion(), 0
+    for _, stamp_ns, _ in log.messages([camera_topic(camera, topics.DISPARITY)]):
+        while known < len(samples) and samples[known].stamp_ns <= stamp_ns:
+            reckoning.add(samples[known])
+            known += 1
+        poses.append(reckoning.pose_at(stamp_ns))
+    return poses

@@ -1,0 +1,275 @@
+"""A row's scored windows as one MCAP log to play in a viewer: target, prediction, mask, certainty and inputs."""
+
+import heapq
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.config import parse_config
+from semgrid_eval.errors import InputError, LogError, ResultError
+from semgrid_eval.files import atomic_file, write_json
+from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.log import topics
+from semgrid_eval.log.codec import transforms_message
+from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, GridPlace, exact_message, viewer_message
+from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.writer import MessageWriter
+from semgrid_eval.playback.drive import Drive, Outgoing
+from semgrid_eval.playback.layout import prediction_topic, viewer_layout
+from semgrid_eval.progress import Progress, silent
+from semgrid_eval.recording.types import Pose
+from semgrid_eval.scores.results import (
+    NOT_RUN,
+    PREDICTIONS_FILE,
+    ResultRecord,
+    RowRecord,
+    RunRecord,
+    WindowRecord,
+    read_predictions,
+    read_result,
+    read_run,
+    read_windows,
+    result_folder,
+    scored_digest,
+)
+
+RECORD = "semgrid.playback"
+GAP_NS = 1_000_000_000
+"""Between recordings that are played one after the other: those of one town may overlap in time."""
+
+_LISTED_NAMES = 10
+
+
+@dataclass(frozen=True)
+class Playback:
+    """What was written: the log, the layout for viewers beside it, and the recordings in it."""
+
+    log: Path
+    layout: Path
+    recordings: tuple[str, ...]
+
+
+def write_playback(
+    run: Path,
+    row_name: str,
+    out: Path,
+    *,
+    logs: Path | None = None,
+    recording: str | None = None,
+    every_recording: bool = False,
+    progress: Progress = silent,
+) -> Playback:
+    """Write the windows of a row as an MCAP log, and a layout for Foxglove and Lichtblick beside it.
+
+    Inputs are moved to the target's time, also those of a row that saw them not moved.
+
+    Args:
+        run: folder of the run.
+        row_name: the row, which has to have predictions.
+        out: the log to write.
+        logs: folder of the run's logs; with it come pictures, calibration and the vehicle's way.
+        recording: the one to play; the first if not given.
+        every_recording: play all of them one after the other, later ones shifted in time.
+        progress: told of each recording.
+
+    Raises:
+        InputError: row, recording or predictions do not exist, or a log is missing or not the one that was scored.
+    """
+    if logs is not None and out.resolve().is_relative_to(logs.resolve()):
+        raise InputError("lies in the folder of logs, where it would be taken for one", path=out)
+    record = read_run(run)
+    scored = _read_scored(run, _row(record, row_name, run))
+    chosen = _choose(scored, recording, every_recording=every_recording)
+    shifts_ns: dict[str, int] = {}
+    cameras: tuple[str, ...] = ()
+    with atomic_file(out) as stream, MessageWriter(stream) as writer:
+        end_ns = None
+        for done, name in enumerate(chosen, start=1):
+            with ExitStack() as stack:
+                drive = _open_drive(record, scored, name, logs, stack) if logs is not None else None
+                track = _Track(scored, name, drive)
+                shift_ns = 0 if end_ns is None else end_ns + GAP_NS - track.first_ns
+                for sent in track.messages(shift_ns):
+                    writer.write(
+                        sent.topic, sent.message, log_ns=sent.log_ns, publish_ns=sent.publish_ns, notes=sent.notes
+                    )
+                cameras = cameras if drive is None else drive.cameras
+            shifts_ns[name], end_ns = shift_ns, track.last_ns + shift_ns
+            progress(done, len(chosen), name)
+        writer.metadata(RECORD, _metadata(record, scored, shifts_ns))
+    layout = out.with_suffix(".layout.json")
+    write_json(layout, viewer_layout(scored.row, cameras))
+    return Playback(out, layout, tuple(chosen))
+
+
+@dataclass(frozen=True)
+class _Scored:
+    """A row's windows with one seed: inputs (N, S, T, H, W); target, mask, prediction and certainty (N, H, W)."""
+
+    row: RowRecord
+    record: ResultRecord
+    grid: GridConfig
+    arrays: dict[str, NDArray[np.uint8]]
+
+    @cached_property
+    def windows_of(self) -> dict[str, list[int]]:
+        """Indices of each recording's windows in the order of time; recordings in the order of their first windows."""
+        windows = self.record.windows
+        found: dict[str, list[int]] = {window.recording: [] for window in windows}
+        for i in sorted(range(len(windows)), key=lambda i: windows[i].target_stamp_ns):
+            found[windows[i].recording].append(i)
+        return found
+
+    @property
+    def place(self) -> GridPlace:
+        """Where the row's grids lie in the grid frame."""
+        spec = self.grid.spec
+        return GridPlace(spec.cell_m, spec.agent_row * spec.cell_m, spec.agent_column * spec.cell_m)
+
+
+def _row(record: RunRecord, name: str, run: Path) -> RowRecord:
+    row = next((row for row in record.rows if row.name == name), None)
+    if row is None:
+        raise InputError(f"there is no row {name!r}, only {_listed([row.name for row in record.rows])}", path=run)
+    if not row.results:
+        raise InputError(f"it has no result: {row.failure or NOT_RUN}", path=run, field=f"row {name}")
+    return row
+
+
+def _read_scored(run: Path, row: RowRecord) -> _Scored:
+    folders = [result_folder(run, result_id) for result_id in row.results]
+    folder = next((folder for folder in folders if (folder / PREDICTIONS_FILE).is_file()), None)
+    if folder is None:
+        raise InputError("none of its results kept its predictions", path=run, field=f"row {row.name}")
+    record = read_result(folder)
+    grid = parse_config(GridConfig, record.config.get("grid"), path=folder / "result.json")
+    arrays = read_predictions(folder) | read_windows(run, record.windows_id)
+    _check_shapes(arrays, record, row, grid, folder)
+    return _Scored(row, record, grid, {name: array.astype(np.uint8) for name, array in arrays.items()})
+
+
+def _check_shapes(
+    arrays: dict[str, NDArray[Any]], record: ResultRecord, row: RowRecord, grid: GridConfig, folder: Path
+) -> None:
+    flat = (len(record.windows), grid.spec.rows, grid.spec.columns)
+    for name, array in arrays.items():
+        expected = (flat[0], len(row.sensors), row.inputs, *flat[1:]) if name == "inputs" else flat
+        if array.shape != expected:
+            raise ResultError(f"has shape {array.shape}, not {expected}", path=folder, field=name)
+
+
+def _choose(scored: _Scored, recording: str | None, *, every_recording: bool) -> list[str]:
+    names = list(scored.windows_of)
+    if not names:
+        raise InputError("has no scored window", field=f"row {scored.row.name}")
+    if every_recording:
+        return names
+    if recording is None:
+        return names[:1]
+    if recording not in names:
+        raise InputError(
+            f"there is no scored recording {recording!r}, only {_listed(names)}", field=f"row {scored.row.name}"
+        )
+    return [recording]
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = len(names) - _LISTED_NAMES
+    return ", ".join(names[:_LISTED_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def _open_drive(record: RunRecord, scored: _Scored, name: str, logs: Path, stack: ExitStack) -> Drive:
+    if not logs.is_dir():
+        raise InputError("is no folder", path=logs)
+    path = scored.record.windows[scored.windows_of[name][0]].log
+    log = stack.enter_context(LogReader(logs / path))
+    known = scored_digest(record, scored.record, path)
+    if log.digest not in (scored.record.log_digests if known is None else (known,)):
+        raise LogError(f"has digest {log.digest}, and the log that was scored had {known or 'another'}", path=log.path)
+    return Drive(log, scored.grid.camera)
+
+
+class _Track:
+    """The messages of one recording.
+
+    Raises:
+        LogError: the log lacks the frame of a target.
+        ResultError: the result does not tell the times of inputs, and there is no log to look them up in.
+    """
+
+    def __init__(self, scored: _Scored, name: str, drive: Drive | None) -> None:
+        self._scored, self._drive = scored, drive
+        self._indices = scored.windows_of[name]
+        windows = [scored.record.windows[i] for i in self._indices]
+        self._windows = windows
+        self._inputs_ns = [self._input_stamps_ns(window) for window in windows]
+        self.last_ns = windows[-1].target_stamp_ns
+        self.first_ns = windows[0].target_stamp_ns if drive is None else min(stamps[0] for stamps in self._inputs_ns)
+
+    def messages(self, shift_ns: int) -> Iterator[Outgoing]:
+        """Iterate over all messages in the order of time, all times shifted."""
+        around = self._around(shift_ns)
+        return heapq.merge(around, self._grids(shift_ns), key=lambda sent: sent.log_ns)
+
+    def _around(self, shift_ns: int) -> Iterator[Outgoing]:
+        if self._drive is None:  # nothing is known of the vehicle's way: each grid lies where the last one did
+            for window in self._windows:
+                now = Pose(window.target_stamp_ns + shift_ns, 0.0, 0.0, 0.0)
+                yield Outgoing(now.stamp_ns, topics.TRANSFORMS, transforms_message(now, {}))
+            return
+        # Grids have the orientation of the first frame of their stretch of the log.
+        first = self._drive.frame_at(self._windows[0].target_stamp_ns) - self._windows[0].target_frame
+        yaw_rad = self._drive.yaw_rad(first)
+        yield from self._drive.messages(self.first_ns, self.last_ns, shift_ns=shift_ns, grid_yaw_rad=yaw_rad)
+
+    def _grids(self, shift_ns: int) -> Iterator[Outgoing]:
+        for index, window, inputs_ns in zip(self._indices, self._windows, self._inputs_ns, strict=True):
+            for topic, values, layer, known_ns in self._layers(index, window, inputs_ns):
+                now_ns, publish_ns = window.target_stamp_ns + shift_ns, known_ns + shift_ns
+                place = self._scored.place
+                message = viewer_message(now_ns, values, layer, place)
+                yield Outgoing(now_ns, topic, message, publish_ns, {"row": self._scored.row.name})
+                if layer.names:
+                    exact = exact_message(now_ns, values, layer, place)
+                    yield Outgoing(now_ns, f"{topic}/exact", exact, publish_ns, {"row": self._scored.row.name})
+
+    def _layers(
+        self, index: int, window: WindowRecord, inputs_ns: Sequence[int]
+    ) -> Iterator[tuple[str, NDArray[np.uint8], GridLayer, int]]:
+        """Give topic, values (H, W), their meaning and since when they could be known, of each grid of a window."""
+        arrays, row = self._scored.arrays, self._scored.row
+        for sensor, past in zip(row.sensors, arrays["inputs"][index], strict=True):
+            for back, (values, stamp_ns) in enumerate(zip(past[::-1], inputs_ns[::-1], strict=True)):
+                topic = f"{topics.GRID_INPUT}/{sensor}" + (f"/before_{back}" if back else "")
+                yield topic, values, CLASSES, stamp_ns
+        yield topics.GRID_TARGET, arrays["target"][index], CLASSES, window.target_stamp_ns
+        yield topics.GRID_MASK, arrays["mask"][index], MASK, window.target_stamp_ns
+        yield prediction_topic(row.name), arrays["prediction"][index], CLASSES, inputs_ns[-1]
+        yield topics.GRID_CERTAINTY, arrays["certainty"][index], CERTAINTY, inputs_ns[-1]
+
+    def _input_stamps_ns(self, window: WindowRecord) -> tuple[int, ...]:
+        if window.input_stamps_ns:
+            return window.input_stamps_ns
+        if self._drive is None:
+            raise ResultError("its result keeps no times of inputs; add the logs", field=f"row {self._scored.row.name}")
+        row = self._scored.row
+        last = self._drive.frame_at(window.target_stamp_ns) - row.horizon_steps * row.step_frames
+        return tuple(self._drive.stamp_ns(last - back * row.step_frames) for back in reversed(range(row.inputs)))
+
+
+def _metadata(record: RunRecord, scored: _Scored, shifts_ns: dict[str, int]) -> dict[str, str]:
+    """Say where the windows come from, and what was added to each recording's times."""
+    return {
+        "run": record.title,
+        "row": scored.row.name,
+        "result": scored.record.id,
+        "seed": json.dumps(scored.record.seed),
+        "shift_ns": json.dumps(shifts_ns),
+    }

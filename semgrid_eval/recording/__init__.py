@@ -1,0 +1,1 @@
+"""What a recording is: calibrated camera frames, motion and truth; pictures as PNG files."""

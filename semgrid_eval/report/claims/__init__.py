@@ -1,0 +1,1 @@
+"""The paper: its table, its claims, and what a run says of them."""

@@ -1,0 +1,234 @@
+"""What a run says about the paper's claims: each one holds, does not hold, stays undecided or was not run."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from semgrid_eval.report.claims.claims import MARGIN, WINDOW_MS, Check, Claim, Rule, claims
+from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores, Scores, weighted_sum
+from semgrid_eval.report.rows.load import Row, Run
+from semgrid_eval.report.tables.table import ABSENT, MINUS, Cell, Line, Table, difference_cell, interval_phrase, plural
+
+TRUTH = "logs that tell where true actors move"
+
+
+class Verdict(StrEnum):
+    """What numbers say of a claim."""
+
+    HOLDS = "holds"
+    FAILS = "does not hold"
+    OPEN = "undecided"
+    NOT_RUN = "not run"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A comparison with its numbers: IoU with the paired interval, or milliseconds with the range over pairs of rows.
+
+    Without the rows it needs, it has no number and names what is missing.
+    """
+
+    check: Check
+    verdict: Verdict
+    difference: Estimate
+    windows: int
+    text: str
+    missing: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A claim with the outcomes of its comparisons, in the run of that tag."""
+
+    run: str
+    claim: Claim
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """A claim fails with any of its comparisons, and holds with all of them."""
+        found = {outcome.verdict for outcome in self.outcomes}
+        return next(v for v in (Verdict.FAILS, Verdict.NOT_RUN, Verdict.OPEN, Verdict.HOLDS) if v in found)
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What would have to be run for the claim to be tested."""
+        return tuple(dict.fromkeys(name for outcome in self.outcomes for name in outcome.missing))
+
+
+def find(runs: Sequence[Run], scores: Scores, regions: Mapping[str, Scores]) -> list[Finding]:
+    """Test every claim on every run, from the scores of all cells and of those near moving and standing actors."""
+    found = []
+    for run in runs:
+        places = {"": _by_record(scores, run)}
+        places |= {name: _by_record(near, run) for name, near in regions.items()}
+        for claim in claims(places[""]):
+            found.append(Finding(run.tag, claim, tuple(_outcome(check, places) for check in claim.checks)))
+    return found
+
+
+def judge(rule: Rule, difference: Estimate) -> Verdict:
+    """Hold the interval of a difference against a rule; without an interval nothing is decided."""
+    low, high = difference.low, difference.high
+    holds, fails = {
+        "better": (low > 0, high < 0),
+        "slower": (low > 0, high < 0),
+        "close": (low > -MARGIN and high < MARGIN, low > MARGIN or high < -MARGIN),
+        "at least": (low > -MARGIN, high < -MARGIN),
+    }[rule]
+    return Verdict.HOLDS if holds else Verdict.FAILS if fails else Verdict.OPEN
+
+
+def sentence(findings: Sequence[Finding]) -> str:
+    """Count the verdicts in words."""
+    count = {kind: sum(each.verdict is kind for each in findings) for kind in Verdict}
+    tested = len(findings) - count[Verdict.NOT_RUN]
+    if not tested:
+        return f"This run lacks the rows to test any of the {plural(len(findings), 'claim')}."
+    words = (
+        (Verdict.HOLDS, "holds", "hold"),
+        (Verdict.FAILS, "does not", "do not"),
+        (Verdict.OPEN, "is undecided", "are undecided"),
+    )
+    parts = ", ".join(f"{count[kind]} {one if count[kind] == 1 else many}" for kind, one, many in words)
+    return f"Of {plural(len(findings), 'claim')}, {tested} can be tested here: {parts}."
+
+
+def finding_table(name: str, findings: Sequence[Finding]) -> Table:
+    """Show the claims that were tested, each above the comparisons behind it."""
+    bodies = tuple(_body(each) for each in findings if each.verdict is not Verdict.NOT_RUN)
+    columns = (("Verdict", ""), ("Score", ""), ("Difference", "95% interval"))
+    caption = f"The paper's claims, and the same against stronger baselines{_tag(findings)}."
+    return Table(name, caption, "Claim", columns, bodies)
+
+
+def missing_table(name: str, findings: Sequence[Finding]) -> Table:
+    """Show the claims that were not tested, and what they need."""
+    bodies = tuple(
+        (Line(each.claim.text, (Cell(", ".join(each.missing)),)),)
+        for each in findings
+        if each.verdict is Verdict.NOT_RUN
+    )
+    caption = f"Claims that were not run, and the rows or logs that they need{_tag(findings)}."
+    return Table(name, caption, "Claim", (("Needs", ""),), bodies)
+
+
+def finding_frame(findings: Sequence[Finding]) -> pd.DataFrame:
+    """Return one line for each comparison, with the verdict of its claim beside its own."""
+    lines = [
+        {"run": each.run, "name": each.claim.name, "claim": each.claim.text, "verdict": str(each.verdict), **part}
+        for each in findings
+        for part in map(_values, each.outcomes)
+    ]
+    return pd.DataFrame(lines)
+
+
+def finding_records(findings: Sequence[Finding]) -> list[dict[str, Any]]:
+    """Return the findings for machines; absent numbers are null."""
+    return [
+        {
+            "run": each.run,
+            "name": each.claim.name,
+            "claim": each.claim.text,
+            "verdict": str(each.verdict),
+            "checks": [
+                {
+                    key: None if isinstance(value, float) and not np.isfinite(value) else value
+                    for key, value in part.items()
+                }
+                for part in map(_values, each.outcomes)
+            ],
+        }
+        for each in findings
+    ]
+
+
+def _tag(findings: Sequence[Finding]) -> str:
+    return next((f" ({each.run})" for each in findings if each.run), "")
+
+
+def _by_record(scores: Scores, run: Run) -> dict[str, RowScores]:
+    """Find a run's rows by the names that presets give them: the row's own, else the one of its model and experiment.
+
+    Where several rows are of one model and experiment, nobody knows which of them a claim is about.
+    """
+    rows_of = Counter(_kind(row) for row in run.rows)
+    mine = [entry for entry in scores.values() if entry.row.run == run.folder]
+    found = {_kind(entry.row): entry for entry in mine if rows_of[_kind(entry.row)] == 1}
+    return found | {entry.row.record.name: entry for entry in mine}
+
+
+def _kind(row: Row) -> str:
+    return f"{row.record.model}-{row.record.experiment}"
+
+
+def _outcome(check: Check, places: Mapping[str, Scores]) -> Outcome:
+    rows = places.get(check.region, {})
+    text = check.text(lambda name: places[""][name].row.record.name if name in places[""] else name)
+    missing = tuple(name for name in check.weights if name not in places[""])
+    if not missing and any(name not in rows for name in check.weights):
+        missing = (TRUTH,)
+    if missing:
+        return Outcome(check, Verdict.NOT_RUN, Estimate(np.nan, np.nan, np.nan), 0, text, missing)
+    if check.score == WINDOW_MS:
+        difference = _time_difference(check, rows)
+    else:
+        difference = weighted_sum([(weight, rows[name]) for name, weight in check.weights.items()], check.score)
+    windows = min(rows[name].row.windows for name in check.weights)
+    return Outcome(check, judge(check.rule, difference), difference, windows, text)
+
+
+def _time_difference(check: Check, rows: Scores) -> Estimate:
+    """Take the mean over pairs of rows, and the range of the pairs in place of an interval."""
+    gaps = [float(np.mean(rows[a].row.window_ms) - np.mean(rows[b].row.window_ms)) for a, b in check.pairs]
+    several = len(gaps) > 1
+    return Estimate(float(np.mean(gaps)), min(gaps) if several else np.nan, max(gaps) if several else np.nan)
+
+
+def _body(finding: Finding) -> tuple[Line, ...]:
+    head = Line(finding.claim.text, (_verdict_cell(finding.verdict), Cell(""), Cell("")))
+    return (head, *(_line(outcome) for outcome in finding.outcomes))
+
+
+def _line(outcome: Outcome) -> Line:
+    check, difference = outcome.check, outcome.difference
+    if outcome.missing:
+        needs = Cell(f"needs {', '.join(outcome.missing)}")
+        return Line(outcome.text, (_verdict_cell(outcome.verdict), needs, Cell(ABSENT)), "part")
+    if check.score == WINDOW_MS:
+        return Line(outcome.text, (_verdict_cell(outcome.verdict), Cell("ms a window"), _time_cell(difference)), "part")
+    label = LABELS[check.score] + (f", {check.region}" if check.region else "")
+    title = f"{interval_phrase(difference, with_sign=True)}; {plural(outcome.windows, 'window')}"
+    number = difference_cell(difference, title=title)
+    return Line(outcome.text, (_verdict_cell(outcome.verdict), Cell(label), number), "part")
+
+
+def _time_cell(difference: Estimate) -> Cell:
+    note = f"range {difference.low:+.1f} to {difference.high:+.1f}" if np.isfinite(difference.low) else "one pair only"
+    return Cell(f"{difference.value:+.1f}", difference.value, note)
+
+
+def _verdict_cell(found: Verdict) -> Cell:
+    return Cell(str(found), tone={Verdict.HOLDS: "holds", Verdict.FAILS: "fails"}.get(found, ""))
+
+
+def _values(outcome: Outcome) -> dict[str, Any]:
+    check, difference = outcome.check, outcome.difference
+    return {
+        "comparison": outcome.text.replace(MINUS, "-"),
+        "score": check.score,
+        "region": check.region or "all",
+        "rule": check.rule,
+        "margin": MARGIN if check.rule in ("close", "at least") else 0.0,
+        "comparison_verdict": str(outcome.verdict),
+        "difference": difference.value,
+        "low": difference.low,
+        "high": difference.high,
+        "windows": outcome.windows,
+        "missing": ", ".join(outcome.missing),
+    }

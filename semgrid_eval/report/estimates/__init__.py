@@ -1,0 +1,1 @@
+"""Figures with intervals: the paired bootstrap."""

@@ -1,0 +1,1 @@
+"""Example windows: which are chosen, and their pictures."""

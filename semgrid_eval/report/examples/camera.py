@@ -1,0 +1,88 @@
+"""What the camera saw of one window: small pictures, the sensors' parts of the image, and the ground that none sees."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
+from semgrid_eval.report.examples.blind import blind_cells
+from semgrid_eval.report.examples.drawing import Picture, data_uri, hatch_png, label_picture
+from semgrid_eval.scores.results import WindowRecord
+from semgrid_eval.scores.thumbnails import LogPictures
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A sensor's part of the camera image, in percent of its width and height."""
+
+    name: str
+    left: float
+    top: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class View:
+    """What is known of a window besides its grids.
+
+    Args:
+        window: the window.
+        kept: what the run kept of its log, None where that is nothing.
+        grid: how its grids were made, None where the result does not tell.
+        sensors: names of the input sensors.
+    """
+
+    window: WindowRecord
+    kept: LogPictures | None
+    grid: GridConfig | None
+    sensors: tuple[str, ...]
+
+    def photos(self, stamp_ns: int | None, moment: str) -> Iterator[Picture]:
+        """Give the camera image and the segmentation of a time, as far as they were kept."""
+        if self.kept is None or self.grid is None or stamp_ns is None or stamp_ns not in self.kept.frames:
+            return
+        files = self.kept.frames[stamp_ns]
+        if files.image:
+            yield Picture("Camera", f"Camera image, {moment}", data_uri(files.image, "image/webp"), kind="camera")
+        with suppress(InputError):  # there is none, or it is damaged
+            title = "Segmentation"
+            yield label_picture(title, f"{title}, {moment}", files.label, self.grid.class_by_label())
+
+    def before(self, stamp_ns: int | None) -> str:
+        """Tell how long before the target a time is."""
+        if stamp_ns is None:
+            return ""
+        return f"{(self.window.target_stamp_ns - stamp_ns) / 1e9:.3f} s before the target"
+
+    def input_stamp_ns(self, back: int) -> int | None:
+        """Return the time of an input, `back` counted from the newest, None where the result does not tell."""
+        stamps = self.window.input_stamps_ns
+        return stamps[-1 - back] if back < len(stamps) else None
+
+    @property
+    def crops(self) -> tuple[Crop, ...]:
+        """The parts of the image that the sensors see, none for the whole image."""
+        if self.grid is None:
+            return ()
+        width, height = self.grid.image_size_px
+        return tuple(
+            Crop(
+                sensor.name,
+                100 * sensor.left_px / width,
+                100 * sensor.top_px / height,
+                100 * (sensor.right_px - sensor.left_px) / width,
+                100 * (sensor.bottom_px - sensor.top_px) / height,
+            )
+            for sensor in self.grid.all_sensors()
+            if sensor.name in self.sensors and sensor.name != TARGET_SENSOR
+        )
+
+    @property
+    def hatching(self) -> str:
+        """A picture to lay over grids that marks the ground that no sensor of an input sees; empty if there is none."""
+        if self.kept is None or self.grid is None or TARGET_SENSOR in self.sensors:
+            return ""
+        cells = blind_cells(self.kept.drive, self.grid, self.sensors, self.window)
+        return data_uri(hatch_png(cells)) if cells is not None and cells.any() else ""

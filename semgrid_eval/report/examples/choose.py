@@ -1,0 +1,176 @@
+"""Example windows, chosen by a rule: where a model most outperforms its baselines, and where it loses most.
+
+The rule is the supplement's: min(IoU_ED-DC - IoU_BL-DC, IoU_ED-DC - IoU_BL-NT), for one class or over all of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, KNOWN_IDS
+from semgrid_eval.report.rows.load import Result, Row, key_of
+from semgrid_eval.report.rows.pairing import Headline, reference_of
+from semgrid_eval.scores.iou import class_iou, mean_finite
+from semgrid_eval.scores.results import WindowRecord
+
+MIN_CELLS = 10
+"""A class counts in the choice of windows only where the target has at least this many of its cells."""
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Contest:
+    """A model and the rows that it is measured against.
+
+    Args:
+        model: the row.
+        rivals: baselines, or the same model asked to look further ahead.
+        baselines: in the second case, the baseline of the model's horizon and of each rival's, None where none is.
+    """
+
+    model: Row
+    rivals: tuple[Row, ...]
+    baselines: tuple[Row | None, ...] = ()
+
+    @property
+    def result(self) -> Result:
+        """The result whose predictions are shown."""
+        return self.model.shown
+
+    @property
+    def rule(self) -> str:
+        """The rule of choice in words."""
+        gaps = [f"IoU {self.model.name} \N{MINUS SIGN} IoU {rival.name}" for rival in self.rivals]
+        if not gaps:
+            return f"IoU {self.model.name}"
+        return gaps[0] if len(gaps) == 1 else f"min({', '.join(gaps)})"
+
+
+@dataclass(frozen=True)
+class Pick:
+    """One chosen window: its index in the contest's result, why it was chosen and its score under the rule."""
+
+    index: int
+    reason: str
+    score: float
+
+
+def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
+    """Choose who is measured against whom: ED-DC against BL-DC and BL-NT where they exist, then the other trained rows.
+
+    Without a trained row, the best row is measured against the other baselines; alone, against nobody.
+    """
+    if headline is None:
+        return []
+    trained = (row for row in (headline.best, headline.rival) if row is not None and not row.is_baseline)
+    main = _row(rows, headline.best, "ED", "DC") or next(trained, headline.best)
+    named = [_row(rows, main, "BL", "DC"), _row(rows, main, "BL", "NT")]
+    rivals = [row for row in named if row is not None and row != main] or _default_rivals(main, rows, headline)
+    others = [(row, reference_of(row, rows)) for row in rows if not row.is_baseline and row != main]
+    found = [Contest(main, tuple(rivals))]
+    later = sorted((row for row in rows if _asks_later(row, main)), key=lambda row: row.record.horizon_steps)
+    if later:
+        found.append(Contest(main, tuple(later), tuple(reference_of(row, rows) for row in (main, *later))))
+    return found + [Contest(row, (reference,)) for row, reference in others if reference is not None]
+
+
+def choose(contest: Contest, *, best: int, worst: int) -> list[Pick]:
+    """Choose windows by the mean over classes: the largest values of the rule, then the smallest."""
+    gaps = rule_values(contest)
+    values = mean_finite(gaps[:, KNOWN_IDS])
+    order = _ordered(values)
+    top = _of_other_recordings(contest.result, order, best)
+    left = _of_other_recordings(contest.result, order[~np.isin(order, top)][::-1], worst)
+    picks = [(i, "Largest over all classes") for i in top] + [(i, "Smallest over all classes") for i in left]
+    return [Pick(i, reason, float(values[i])) for i, reason in picks]
+
+
+def choose_by_class(contest: Contest) -> list[Pick]:
+    """Choose, for each class but `unknown`, the window with the largest and the one with the smallest value."""
+    gaps, picks = rule_values(contest), []
+    for index in KNOWN_IDS:
+        order = _ordered(gaps[:, index])
+        ends = [(order[0], "largest"), (order[-1], "smallest")] if len(order) > 1 else [(i, "only") for i in order]
+        label = CLASS_NAMES[index].replace("_", " ").capitalize()
+        picks += [Pick(int(i), f"{label}, {end}", float(gaps[i, index])) for i, end in ends]
+    return picks
+
+
+def by_window(picks: Sequence[Pick]) -> list[tuple[Pick, ...]]:
+    """Gather picks of the same window, windows in the order of their first pick."""
+    found: dict[int, list[Pick]] = {}
+    for pick in picks:
+        found.setdefault(pick.index, []).append(pick)
+    return [tuple(group) for group in found.values()]
+
+
+def mean_iou(result: Result, window: WindowRecord) -> float:
+    """Mean IoU of a result in one window over the known classes with enough cells; NaN where it has no such window."""
+    at = result.places.get(key_of(window))
+    if at is None:
+        return float("nan")
+    counts = result.counts[[at]].astype(np.int64)
+    values = np.where(counts.sum(axis=2) < MIN_CELLS, np.nan, class_iou(counts))
+    return float(mean_finite(values[0, KNOWN_IDS]))
+
+
+def rule_values(contest: Contest) -> Array:
+    """Evaluate the rule for each window and class: (N, C); NaN where there is too little of the class."""
+    counts = contest.result.counts
+    mine = class_iou(counts.astype(np.int64))
+    few = counts.sum(axis=2) < MIN_CELLS
+    gaps = [mine - _aligned_iou(contest.result, rival.shown) for rival in contest.rivals] or [mine]
+    value = gaps[0]
+    for gap in gaps[1:]:
+        value = np.minimum(value, gap)
+    return np.where(few, np.nan, value)
+
+
+def _aligned_iou(result: Result, other: Result) -> Array:
+    """IoU of another result's windows in the order of `result`; NaN where it has no such window."""
+    theirs = class_iou(other.counts.astype(np.int64))
+    places = np.array([other.places.get(key_of(window), -1) for window in result.record.windows], np.intp)
+    padded = np.vstack([theirs, np.full((1, CLASS_COUNT), np.nan)])
+    return np.asarray(padded[places])
+
+
+def _asks_later(row: Row, main: Row) -> bool:
+    """Tell whether a row is the same model asked to look further ahead, at the same target frames."""
+    further = row.record.horizon_steps > main.record.horizon_steps
+    return further and row.run == main.run and _but_horizon(row) == _but_horizon(main)
+
+
+def _but_horizon(row: Row) -> dict[str, object]:
+    """Return what determined a row's numbers, but how far it looks ahead."""
+    return {key: value for key, value in row.shown.settings.items() if not key.endswith("horizon_steps")}
+
+
+def _row(rows: Sequence[Row], like: Row, model: str, experiment: str) -> Row | None:
+    wanted = f"{model}-{experiment}"
+    return next((row for row in rows if row.record.name == wanted and row.run == like.run), None)
+
+
+def _default_rivals(main: Row, rows: Sequence[Row], headline: Headline) -> list[Row]:
+    reference = reference_of(main, rows)
+    if reference is not None:
+        return [reference]
+    return [row for row in (headline.best, headline.rival) if row is not None and row != main][:1] or [
+        row for row in rows if row != main and row.run == main.run and row.is_baseline
+    ][:1]
+
+
+def _ordered(values: Array) -> NDArray[np.intp]:
+    """Order the windows that have a value, largest first, ties in the order of the windows."""
+    order = np.argsort(-values, kind="stable")
+    return order[np.isfinite(values[order])]
+
+
+def _of_other_recordings(result: Result, order: NDArray[np.intp], count: int) -> list[int]:
+    """Take the first windows of an order, one of each recording, so that examples show different scenes."""
+    taken: dict[str, int] = {}
+    for i in order.tolist():
+        taken.setdefault(result.record.windows[i].recording, i)
+    return list(taken.values())[:count]

@@ -1,0 +1,129 @@
+"""The example windows of a page: who is measured against whom, which windows show it, and what cannot be shown."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from semgrid_eval.errors import SemgridError
+from semgrid_eval.report.examples.choose import Contest, Pick, choose, choose_by_class, contests
+from semgrid_eval.report.examples.kept import Glimpses
+from semgrid_eval.report.examples.panels import Example, Shown, draw_examples
+from semgrid_eval.report.rows.load import Row, Run, WindowReader
+from semgrid_eval.report.rows.pairing import Headline
+from semgrid_eval.scores.results import read_windows
+
+_BEST, _WORST, _OTHER = 3, 3, 1
+_AHEAD = "Looking further ahead"
+
+
+@dataclass(frozen=True)
+class Group:
+    """The example windows of one contest, or in words why there are none.
+
+    Args:
+        hint: what is special about it.
+        rule: by which its windows were chosen.
+        seed: of the predictions shown.
+        shown: whether the group is open when the page is opened.
+    """
+
+    title: str
+    hint: str
+    rule: str
+    seed: int | None
+    windows: tuple[Example, ...]
+    problem: str
+    shown: bool = False
+
+
+def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | None) -> list[Group]:
+    """Draw the example windows: the main contest, its classes, and one good and one bad window of the others."""
+    chosen = contests(rows, found)
+    if not chosen:
+        return []
+    kept = {run.folder: Glimpses(run) for run in runs}
+    main, *others = chosen
+    plans = [
+        {"": choose(main, best=_BEST, worst=_WORST), ", class by class": choose_by_class(main)},
+        *({"": choose(each, best=_OTHER, worst=_OTHER)} for each in others),
+    ]
+    read = lru_cache(1)(read_windows)  # contests that share windows are drawn one after the other
+    drawn = {
+        i: groups_of(chosen[i], plans[i], kept[chosen[i].model.run], read)
+        for i in sorted(range(len(chosen)), key=lambda i: chosen[i].model.window_set)
+    }
+    first, *rest = (group for i in range(len(chosen)) for group in drawn[i])
+    return [replace(first, shown=True), *rest]
+
+
+def groups_of(
+    contest: Contest, plan: Mapping[str, Sequence[Pick]], glimpses: Glimpses, read: WindowReader = read_windows
+) -> list[Group]:
+    """Draw the chosen windows of a contest, a group for each end of its title; what cannot be read is their problem."""
+    windows: dict[str, tuple[Example, ...]] = dict.fromkeys(plan, ())
+    problem = ""
+    try:
+        shown = Shown(contest, {pick.index for picks in plan.values() for pick in picks}, read)
+        windows = {end: tuple(draw_examples(shown, picks, glimpses)) for end, picks in plan.items()}
+    except (SemgridError, ValueError, IndexError) as error:
+        problem = f"The pictures of {contest.model.name} cannot be shown: {error}"
+    return [
+        Group(
+            title=_title(contest) + end,
+            hint=_hint(contest, windows[end]),
+            rule=contest.rule,
+            seed=contest.result.record.seed,
+            windows=windows[end],
+            problem=problem if picks else "No window has enough cells of any class.",
+        )
+        for end, picks in plan.items()
+    ]
+
+
+def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
+    """Say which kinds of examples this run cannot show, and why."""
+    if not groups:
+        return []
+    said = []
+    if not any(len(row.record.sensors) > 1 for row in rows):
+        said.append("No row has several sensors, so there is no example with a blind band.")
+    if not any(group.title.startswith(_AHEAD) for group in groups):
+        said.append("The model was not run with several horizons, so there is no example of them in a row.")
+    shown = [window for group in groups for window in group.windows]
+    pictures = [picture for window in shown for column in window.film for picture in column.pictures]
+    if shown and not any(picture.kind == "camera" for picture in pictures):
+        said.append(
+            "There are no camera images: the run kept none of its logs, or they hold none. "
+            "Started again where its logs are, semgrid-eval run adds what is missing."
+        )
+    return said
+
+
+def widths(rows: Sequence[Row]) -> str:
+    """Say how wide the grids of rows are."""
+    specs = [row.shown.spec for row in rows]
+    return " or ".join(f"{width_m:g} m" for width_m in sorted({spec.columns * spec.cell_m for spec in specs}))
+
+
+def _title(contest: Contest) -> str:
+    names = [contest.model.name, *(rival.name for rival in contest.rivals)]
+    if contest.baselines:
+        return f"{_AHEAD}: {', '.join(names)}"
+    return names[0] + (f" against {' and '.join(names[1:])}" if names[1:] else "")
+
+
+def _hint(contest: Contest, windows: Sequence[Example]) -> str:
+    if contest.baselines:
+        return (
+            "Each column asks the same model for the same target, the farther to the left the earlier: "
+            "the newest input that it had, what it predicted, and the baseline's answer to the same question."
+        )
+    if any(window.hatching for window in windows):
+        return (
+            "The frames in the camera image are the sensors. Hatched is the ground that the camera sees and no sensor "
+            "of an input does. It is taken as flat, so walls and vehicles may reach into it. What a model says there "
+            "it has learned."
+        )
+    if len(contest.model.record.sensors) > 1:
+        return "Each input is seen by several sensors; the target comes from the whole image."
+    return ""

@@ -1,0 +1,211 @@
+"""The pictures of an example window: camera, segmentation and grids over time, predictions, who is right, certainty."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.report.examples.camera import Crop, View
+from semgrid_eval.report.examples.choose import Contest, Pick, by_window, mean_iou
+from semgrid_eval.report.examples.drawing import (
+    HATCHED,
+    LEGEND,
+    Grid,
+    Picture,
+    certainty_png,
+    data_uri,
+    grid_picture,
+    right_png,
+)
+from semgrid_eval.report.examples.kept import Glimpses, times
+from semgrid_eval.report.rows.load import Row, WindowReader, key_of
+from semgrid_eval.report.tables.table import ABSENT, number, plural, signed
+from semgrid_eval.scores.results import read_predictions, read_windows
+
+_FEWEST_COLUMNS, _MOST_COLUMNS = 4, 6
+
+
+@dataclass(frozen=True)
+class Column:
+    """Pictures of one moment, one above the other, with a title and a small second line.
+
+    Args:
+        step: whether it belongs to the way from the inputs over the target to the prediction.
+    """
+
+    title: str
+    note: str
+    pictures: tuple[Picture, ...]
+    step: bool = True
+
+    @property
+    def grids(self) -> int:
+        """How many of the pictures are grids."""
+        return sum(picture.kind == "grid" for picture in self.pictures)
+
+
+@dataclass(frozen=True)
+class Example:
+    """One example window, ready to be shown.
+
+    Args:
+        title: why it was chosen.
+        times: of the target, in several forms.
+        command: plays the recording.
+        film: inputs and target in the order of time.
+        answers: predictions and what follows from them.
+        crops: parts of the camera's image that act as sensors.
+        hatching: a picture to lay over grids.
+    """
+
+    title: str
+    recording: str
+    log: str
+    frame: int
+    times: tuple[str, ...]
+    command: str
+    film: tuple[Column, ...]
+    answers: tuple[Column, ...]
+    legend: tuple[tuple[str, str], ...]
+    crops: tuple[Crop, ...] = ()
+    hatching: str = ""
+
+    @property
+    def columns(self) -> int:
+        """How many columns stand side by side on a wide screen."""
+        return max(_FEWEST_COLUMNS, min(_MOST_COLUMNS, max(len(self.film), len(self.answers))))
+
+
+class Shown:
+    """The arrays of a contest at some of its windows, by the windows' indices in the contest's result.
+
+    Raises:
+        ResultError: arrays of the windows or of a prediction are missing or damaged.
+    """
+
+    def __init__(self, contest: Contest, at: Iterable[int], read: WindowReader = read_windows) -> None:
+        self.contest = contest
+        self._windows = {i: contest.result.record.windows[i] for i in at}
+        asked = (contest.model, *contest.rivals)
+        answering = {row.name: row for row in (*asked, *contest.baselines) if row is not None}
+        seeing = asked if contest.baselines else asked[:1]
+        self._seen = {row.name: self._of(row, read(*row.window_set)) for row in seeing}
+        self._answers = {name: self._of(row, read_predictions(row.shown.folder)) for name, row in answering.items()}
+
+    def film(self, i: int, view: View) -> Iterator[Column]:
+        """Give the inputs and the target; where the contest is about horizons, each row's newest input and answer."""
+        yield from self._horizons(i, view) if self.contest.baselines else self._inputs(i, view)
+        seen = self._seen[self.contest.model.name][i]
+        target = grid_picture("Target", "Target grid with mask M in white", seen["target"], seen["mask"] > 0)
+        photos = view.photos(view.window.target_stamp_ns, "at the target's time")
+        yield Column("Target", "to be predicted", (*photos, target))
+
+    def answers(self, i: int) -> Iterator[Column]:
+        """Give the prediction, those of rivals, who is right, and certainty."""
+        if self.contest.baselines:
+            return
+        model = self.contest.model
+        seen, mine = self._seen[model.name][i], self._answers[model.name][i]
+        yield self._answer(model, i, step=True)
+        there = [row for row in self.contest.rivals if i in self._answers[row.name]]
+        for row in there:
+            yield self._answer(row, i, step=False)
+        for row in there[:1]:
+            alt = f"Cells where {model.name} or {row.name} is right"
+            theirs = self._answers[row.name][i]["prediction"]
+            right = right_png(seen["target"], mine["prediction"], theirs, seen["mask"] > 0)
+            yield Column("Who is right", "cell by cell", (Picture("", alt, data_uri(right)),), step=False)
+        certainty = mine["certainty"]
+        if certainty.min() < certainty.max():  # a baseline is equally certain of everything
+            alt = f"Certainty of {model.name}, light is certain"
+            picture = Picture("", alt, data_uri(certainty_png(certainty)))
+            yield Column("Certainty", "light is certain", (picture,), step=False)
+
+    def _inputs(self, i: int, view: View) -> Iterator[Column]:
+        model = self.contest.model
+        inputs, names = self._seen[model.name][i]["inputs"], model.record.sensors
+        sensors, steps = inputs.shape[:2]
+        for t in range(steps):
+            title, stamp_ns = f"Input {t + 1} of {steps}", view.input_stamp_ns(steps - 1 - t)
+            grids = (_input_picture(inputs[s, t], title, names[s] if sensors > 1 else "") for s in range(sensors))
+            yield Column(title, view.before(stamp_ns), (*view.photos(stamp_ns, title), *grids))
+
+    def _horizons(self, i: int, view: View) -> Iterator[Column]:
+        """Give a column for each horizon, the farthest first: what was known then, and what was made of it."""
+        contest = self.contest
+        for row, baseline in reversed(list(zip((contest.model, *contest.rivals), contest.baselines, strict=True))):
+            if i not in self._seen[row.name]:
+                continue
+            inputs = self._seen[row.name][i]["inputs"][:, -1]  # (S, H, W)
+            title = f"Newest input of {row.name}"
+            names = row.record.sensors if len(inputs) > 1 else ("",)
+            grids = [_input_picture(grid, title, name, lead=False) for grid, name in zip(inputs, names, strict=True)]
+            grids.append(self._prediction(row, i, f"{row.name}{self._iou(row, i)}"))
+            if baseline is not None and i in self._answers[baseline.name]:
+                title = f"{baseline.name}{self._iou(baseline, i)}"
+                grids.append(self._prediction(baseline, i, title, lead=False))
+            title = f"{plural(row.record.horizon_steps, 'step')} ahead"
+            stamps = row.shown.record.windows[row.shown.places[key_of(self._windows[i])]].input_stamps_ns
+            stamp_ns = stamps[-1] if stamps else None
+            yield Column(title, view.before(stamp_ns), (*view.photos(stamp_ns, title), *grids))
+
+    def _answer(self, row: Row, i: int, *, step: bool) -> Column:
+        return Column(row.name, self._iou(row, i).removeprefix(", "), (self._prediction(row, i, ""),), step)
+
+    def _prediction(self, row: Row, i: int, title: str, *, lead: bool = True) -> Picture:
+        return grid_picture(title, f"Prediction of {row.name}", self._answers[row.name][i]["prediction"], lead=lead)
+
+    def _iou(self, row: Row, i: int) -> str:
+        value = number(mean_iou(row.shown, self._windows[i]))
+        return "" if value == ABSENT else f", mean IoU {value}"
+
+    def _of(self, row: Row, arrays: Mapping[str, NDArray[np.generic]]) -> dict[int, dict[str, Grid]]:
+        """Copy what arrays hold of the windows that a row has, so that the rest need not be kept."""
+        places = {i: row.shown.places.get(key_of(window)) for i, window in self._windows.items()}
+        return {
+            i: {name: np.array(array[place], np.uint8) for name, array in arrays.items()}
+            for i, place in places.items()
+            if place is not None
+        }
+
+
+def draw_examples(shown: Shown, picks: Sequence[Pick], glimpses: Glimpses) -> Iterator[Example]:
+    """Draw the chosen windows of a contest, each window once."""
+    contest, result = shown.contest, shown.contest.result
+    for group in by_window(picks):
+        index = group[0].index
+        window = result.record.windows[index]
+        kept = glimpses.of(window.log, result)
+        view = View(window, kept, result.grid, contest.model.record.sensors)
+        film = tuple(shown.film(index, view))
+        answers = tuple(shown.answers(index))
+        hatching = view.hatching
+        yield Example(
+            title="; ".join(f"{pick.reason}: {_score(contest, pick)}" for pick in group),
+            recording=window.recording,
+            log=window.log,
+            frame=window.target_frame,
+            times=times(window.target_stamp_ns, kept),
+            command=glimpses.command(contest.model, window),
+            film=film,
+            answers=answers,
+            legend=_legend([*film, *answers], {HATCHED} if hatching else set()),
+            crops=view.crops if kept is not None else (),
+            hatching=hatching,
+        )
+
+
+def _input_picture(grid: Grid, title: str, sensor: str, *, lead: bool = True) -> Picture:
+    name = f"{title}, {sensor}" if sensor else title
+    return grid_picture(sensor or "Newest input", f"{name}, aligned to the target", grid, lead=lead)
+
+
+def _score(contest: Contest, pick: Pick) -> str:
+    return signed(pick.score) if contest.rivals else number(pick.score)
+
+
+def _legend(columns: Iterable[Column], more: set[int]) -> tuple[tuple[str, str], ...]:
+    """Name the colours that appear in an example."""
+    there = more.union(*(picture.colours for column in columns for picture in column.pictures))
+    return tuple(LEGEND[i] for i in sorted(there))

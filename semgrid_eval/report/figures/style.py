@@ -1,0 +1,118 @@
+"""What a figure of the report is: PNG and SVG, one style, and a form that follows a page's light or dark theme."""
+
+import io
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from semgrid_eval.report.claims.paper import paper_table
+from semgrid_eval.report.estimates.bootstrap import Scores
+from semgrid_eval.report.tables.table import plural
+
+# Okabe and Ito's colours, which colour-blind readers can tell apart; the first two are those of BL and ED.
+PALETTE = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
+STROKES = ("-", "--", ":", "-.")
+INK, MUTED, RULE = "#2a2f36", "#5d6670", "#d5d9de"
+_DARK = {INK: "#dfe3e8", MUTED: "#9aa3ad", RULE: "#3a4048"}
+SETTINGS: Any = {
+    "font.family": "sans-serif",
+    "font.size": 9,
+    "text.parse_math": False,  # names are text, whatever dollar signs they hold
+    "svg.fonttype": "none",
+    "svg.hashsalt": "semgrid-eval",
+    "axes.facecolor": "none",  # a page in the dark has no white boxes
+    "axes.edgecolor": RULE,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.titlesize": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "grid.color": RULE,
+    "grid.linewidth": 0.6,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.frameon": False,
+}
+PAPER_MARKS: Any = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.8}
+"""How the paper's own values are marked: small hollow diamonds."""
+_NAME_CHARACTERS = 18
+_PICTURE_DPI = 160
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure in both forms, the table it was drawn from, what it shows in words, and its natural size."""
+
+    name: str
+    png: bytes
+    svg: str
+    source: str
+    caption: str
+    width_px: int
+    height_px: int
+
+    @property
+    def themed_svg(self) -> str:
+        """The SVG with colours that follow the reader's light or dark setting, and without a background."""
+        light = "".join(f"--c{i}:{colour};" for i, colour in enumerate(_DARK))
+        dark = "".join(f"--c{i}:{colour};" for i, colour in enumerate(_DARK.values()))
+        media = f"@media (prefers-color-scheme:dark){{:root{{{dark}}}}}"
+        style = f"<style>:root{{{light}}}{media}#patch_1{{display:none}}</style>"
+        text = self.svg
+        for i, colour in enumerate(_DARK):
+            text = text.replace(colour, f"var(--c{i})")
+        head, tail = text.split("<defs>", 1)
+        return f"{head}{style}<defs>{tail}"
+
+
+def evidence(scores: Scores) -> str:
+    """Count the windows and recordings behind a figure's rows."""
+    windows = {entry.row.windows for entry in scores.values()}
+    records = (w for entry in scores.values() for w in entry.row.results[0].record.windows)
+    recordings = len({window.drive for window in records})
+    count = plural(max(windows), "window") if len(windows) == 1 else f"{min(windows)} to {max(windows)} windows"
+    return f"{count} a row, {plural(recordings, 'recording')}"
+
+
+def paper_note(scores: Scores) -> str:
+    """End a caption, saying what the diamonds are where the paper has any of the rows."""
+    beside = any(entry.row.record.name in paper_table() for entry in scores.values())
+    return "; diamonds are the paper's values, on Cityscapes." if beside else "."
+
+
+def line_style(index: int) -> dict[str, Any]:
+    """Give the colour and stroke of one of many lines."""
+    colours = len(PALETTE)
+    return {"color": PALETTE[index % colours], "linestyle": STROKES[index // colours % len(STROKES)]}
+
+
+def short(name: str) -> str:
+    """Cut a name to what fits under a bar; control characters, which XML forbids, become spaces."""
+    name = "".join(character if character.isprintable() else " " for character in name)
+    return name if len(name) <= _NAME_CHARACTERS else f"{name[: _NAME_CHARACTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+
+
+def finish(figure: Figure, name: str, source: str, caption: str) -> Plot:
+    """Save a figure in both forms, the same figure always as the same bytes."""
+    picture, drawing = io.BytesIO(), io.BytesIO()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")  # names may be in any script
+        canvas: Any = FigureCanvasAgg(figure)  # its methods have no types
+        figure.set_dpi(_PICTURE_DPI)
+        canvas.draw()  # lays the figure out, too
+        pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+        Image.fromarray(pixels.copy()).save(picture, "PNG", dpi=(_PICTURE_DPI, _PICTURE_DPI))
+        figure.set_layout_engine("none")  # it has done its work; without this, it would be laid out again
+        figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})
+    text = drawing.getvalue().decode()
+    width_px, height_px = (round(96 * inches) for inches in figure.get_size_inches())
+    return Plot(name, picture.getvalue(), text[text.index("<svg") :], source, caption, width_px, height_px)

@@ -1,0 +1,176 @@
+"""Where a report's numbers come from: failures, logs, results, versions and the commands that made them."""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+import yaml
+
+from semgrid_eval.files import digest_value
+from semgrid_eval.log.benchmarks import FINGERPRINT_CHARACTERS, published_fingerprints
+from semgrid_eval.report.claims.scaling import scaling
+from semgrid_eval.report.page.commands import row_command
+from semgrid_eval.report.rows.load import Row, Run
+from semgrid_eval.report.tables.table import Cell, Line, Table, plural
+from semgrid_eval.scores.results import NOT_RUN, LogRecord, RunRecord
+
+WINDOW_COLUMNS = ("window_set", "recording", "log", "target_frame", "target_stamp_ns", "input_stamps_ns")
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Something that failed, and why."""
+
+    kind: str
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a page says of how one run was made."""
+
+    entries: tuple[tuple[str, str], ...]
+    scaling: str
+    matrix: str
+    matrix_file: str
+
+
+def failures(runs: Sequence[Run]) -> list[Failure]:
+    """List the rows, results and logs that failed."""
+    found = []
+    for run in runs:
+        found += [Failure("row", row.name, reason) for row in run.rows for reason in row.failures]
+        found += [Failure("log", path, reason) for path, reason in sorted(run.record.failed_logs.items())]
+    return found
+
+
+def facts(run: Run, runs: Sequence[Run]) -> Facts:
+    """List how a run was made."""
+    record = run.record
+    entries = [
+        ("Title", record.title),
+        ("Command", record.command),
+        ("Last start", record.started),
+        ("Duration of the last start", duration(record.seconds)),
+        *(("Data", text) for text in data_sets(record)),
+        *((f"Version of {name}", version) for name, version in sorted(record.versions.items())),
+        *((f"Machine: {name.replace('_', ' ')}", value) for name, value in sorted(record.machine.items())),
+    ]
+    return Facts(tuple(entries), scaling(run), matrix_text(run), matrix_file(run, runs))
+
+
+def data_sets(record: RunRecord) -> list[str]:
+    """Name each data set of a run with its logs by split and a digest of them all, equal where all logs are.
+
+    Of a published benchmark, say whether they are its logs.
+    """
+    found: dict[str, list[LogRecord]] = {}
+    for log in record.logs:
+        found.setdefault(log.dataset, []).append(log)
+    return [_data_set(name, logs) for name, logs in sorted(found.items())]
+
+
+def _data_set(name: str, logs: Sequence[LogRecord]) -> str:
+    digest = digest_value(sorted((log.split, log.name, log.digest) for log in logs))
+    text = f"{name}: {_by_split(log.split for log in logs)}; digest {digest}"
+    published = published_fingerprints(name)
+    # A log to train on and to score is there twice.
+    known = {log.digest: (log.fingerprint or "")[:FINGERPRINT_CHARACTERS] for log in logs}
+    if not published or not any(known.values()):  # runs of older versions know none
+        return text
+    if others := sum(fingerprint not in published for fingerprint in known.values()):
+        return f"{text}; {others} of {len(known)} are not as published"
+    return f"{text}; {'all' if len(known) == len(published) else f'{len(known)} of {len(published):,}'}, as published"
+
+
+def _by_split(splits: Iterable[str]) -> str:
+    return " and ".join(f"{plural(count, 'log')} of {split}" for split, count in sorted(Counter(splits).items()))
+
+
+def matrix_text(run: Run) -> str:
+    """Write the run's matrix with every row complete, as `semgrid-eval run` reads it."""
+    return yaml.safe_dump(run.record.matrix, sort_keys=False, allow_unicode=True, width=100)
+
+
+def matrix_file(run: Run, runs: Sequence[Run]) -> str:
+    """Name the file beside the page that holds the run's matrix."""
+    return "matrix.yaml" if len(runs) == 1 else f"matrix-{1 + runs.index(run)}.yaml"
+
+
+def command_table(runs: Sequence[Run]) -> Table:
+    """Show what each row does and the command line that makes it again."""
+    bodies = []
+    for run in runs:
+        for row in run.rows:
+            command = row_command(run.record.command, row.record.name, matrix_file(run, runs))
+            cells = (Cell(row.record.label), Cell(_state(row)), Cell(command, tone="command"))
+            bodies.append((Line(row.name, cells),))
+    caption = (
+        "How to make each row again. A run keeps what lies in its --out already: name another folder to start anew."
+    )
+    columns = tuple((text, "") for text in ("What it does", "Results", "Command"))
+    return Table("commands", caption, "Row", columns, tuple(bodies))
+
+
+def window_frame(runs: Sequence[Run]) -> pd.DataFrame:
+    """Return one line for each window of each set of windows, with the times of its target and inputs."""
+    results = (result.record for run in runs for row in run.rows for result in row.results)
+    lines = [
+        (name, w.recording, w.log, w.target_frame, w.target_stamp_ns, " ".join(map(str, w.input_stamps_ns)))
+        for name, record in {record.windows_id: record for record in results}.items()
+        for w in record.windows
+    ]
+    return pd.DataFrame(lines, columns=list(WINDOW_COLUMNS))
+
+
+def _state(row: Row) -> str:
+    if row.is_left:
+        return NOT_RUN
+    if not row.results:
+        return "failed"
+    trained = row.results[0].record.seed is not None
+    return plural(len(row.results), "seed") if trained else "no training"
+
+
+def log_table(runs: Sequence[Run]) -> Table:
+    """List the logs by their paths, which example windows name, too, with their digests."""
+    logs = {(log.path, log.digest): log for run in runs for log in run.record.logs}
+    bodies = tuple((Line(log.path, (Cell(log.dataset), Cell(log.split), Cell(log.digest))),) for log in logs.values())
+    columns = tuple((text, "") for text in ("Data set", "Split", "Digest"))
+    return Table("logs", "Logs that took part, by their paths below the folder of logs", "Log", columns, bodies)
+
+
+def result_table(runs: Sequence[Run]) -> Table:
+    """List every result: its row, seed, id, windows and cost."""
+    bodies = []
+    for run in runs:
+        for row in run.rows:
+            for result in row.results:
+                record = result.record
+                cells = (
+                    Cell("none" if record.seed is None else str(record.seed), record.seed),
+                    Cell(record.id),
+                    Cell(record.windows_id),
+                    Cell(f"{len(record.windows):,}", len(record.windows)),
+                    _seconds(record.train_seconds),
+                    _seconds(record.predict_seconds),
+                    Cell(record.device),
+                )
+                bodies.append((Line(row.name, cells, title=row.record.label),))
+    names = ("Seed", "Result", "Window set", "Windows", "Training", "Prediction", "Device")
+    return Table("results", "Results behind the rows", "Row", tuple((name, "") for name in names), tuple(bodies))
+
+
+def duration(seconds: float) -> str:
+    """Write a duration in hours, minutes and seconds."""
+    whole = round(seconds)
+    hours, minutes = whole // 3600, whole % 3600 // 60
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {whole % 60} s" if minutes else f"{seconds:.1f} s"
+
+
+def _seconds(value: float | None) -> Cell:
+    return Cell("none") if value is None else Cell(f"{value:.1f} s", value)

@@ -1,0 +1,151 @@
+"""What the numbers say, in a few plain sentences and a few large figures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, Scores
+from semgrid_eval.report.rows.load import Row, Run, key_of
+from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, Headline, verdict
+from semgrid_eval.report.tables.table import interval, interval_phrase, number, plural, signed
+
+_FEW_RECORDINGS, _FEW_SEEDS = 10, 5
+_WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One difference, large: its label, the value, its interval and where they lie on a common axis (percent).
+
+    `title` tells what stands behind it.
+    """
+
+    label: str
+    value: str
+    note: str
+    tone: str
+    word: str
+    low: float
+    high: float
+    at: float
+    title: str
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The head of a page: sentences, and tiles with what they compare."""
+
+    sentences: tuple[str, ...]
+    compared: str
+    tiles: tuple[Tile, ...]
+
+
+def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None) -> Summary:
+    """Put a report into a few sentences."""
+    sentences = [_which(scores, found), _against_reference(scores, found), _evidence(runs, scores)]
+    compared, tiles = _tiles(scores, found)
+    return Summary(tuple(sentence for sentence in sentences if sentence), compared, tiles)
+
+
+def _which(scores: Scores, found: Headline | None) -> str:
+    if found is None:
+        return "No row has a score: nothing can be compared."
+    best = scores[found.best.name]
+    among = "" if found.compared == len(scores) else f"Of {found.compared} rows with the same inputs and horizon, "
+    start = f"{among}{found.best.name} has the highest mean class IoU, {number(best.mean[HEADLINE])} without unknown"
+    if found.rival is None:
+        return f"{start} ({interval_phrase(best.estimate(HEADLINE))}); there is no other row to compare with."
+    lead = best.minus(scores[found.rival.name], HEADLINE)
+    kind, word = _kind(found.best, found.rival), _WORDS[verdict(lead)]
+    phrase = interval_phrase(lead, with_sign=True)
+    return f"{start}: {signed(lead.value)} over {found.rival.name}, {kind}, {word} ({phrase})."
+
+
+def _against_reference(scores: Scores, found: Headline | None) -> str:
+    model, other = _pair(found)
+    if model is None or other is None:
+        return ""
+    groups: dict[str, list[str]] = {}
+    for column in DIFFERENCE_COLUMNS[:-1]:
+        difference = scores[model.name].minus(scores[other.name], column)
+        if not isfinite(difference.value):  # a class that is nowhere
+            continue
+        text = f"{LABELS[column].lower()} ({signed(difference.value)})"
+        groups.setdefault(verdict(difference), []).append(text)
+    parts = [f"{_WORDS[word]} on {_listed(groups[word])}" for word in _WORDS if word in groups]
+    return f"Against {other.name}, {model.name} is {'; '.join(parts)}." if parts else ""
+
+
+def _evidence(runs: Sequence[Run], scores: Scores) -> str:
+    rows = [entry.row for entry in scores.values()]
+    records = [window for row in rows for result in row.results for window in result.record.windows]
+    windows = len(set(map(key_of, records)))
+    recordings = len({window.drive for window in records})
+    text = f"This rests on {plural(windows, 'window')} from {plural(recordings, 'recording')}"
+    seeds = [len(row.results) for row in rows if row.results[0].record.seed is not None]
+    if seeds:
+        span = plural(max(seeds), "seed") if min(seeds) == max(seeds) else f"{min(seeds)} to {max(seeds)} seeds"
+        text += f" and {span} for each trained row"
+    failed = sum(bool(row.failures) for run in runs for row in run.rows)
+    text += f"; {plural(failed, 'row')} failed" if failed else "; no row failed"
+    if left := sum(row.is_left for run in runs for row in run.rows):
+        text += f", {left} {'was' if left == 1 else 'were'} not run yet"
+    return f"{text}.{_doubt(recordings, seeds)}"
+
+
+def _doubt(recordings: int, seeds: Sequence[int]) -> str:
+    if recordings < 2:
+        return " With fewer than two recordings there are no intervals."
+    doubts = [" With so few recordings the intervals are rough."] if recordings < _FEW_RECORDINGS else []
+    if seeds and min(seeds) < _FEW_SEEDS:
+        part = "the" if min(seeds) == 1 else "much of the"
+        doubts.append(f" Intervals of rows with {plural(min(seeds), 'seed')} leave out {part} chance in training.")
+    return "".join(doubts)
+
+
+def _tiles(scores: Scores, found: Headline | None) -> tuple[str, tuple[Tile, ...]]:
+    model, other = _pair(found)
+    if model is None or other is None:
+        return "", ()
+    differences = {c: scores[model.name].minus(scores[other.name], c) for c in DIFFERENCE_COLUMNS}
+    bounds = [abs(v) for d in differences.values() for v in (d.value, d.low, d.high) if v == v]
+    reach = 1.1 * max([*bounds, 1e-3])
+    behind = f"{_results(model)} and {_results(other)}, {plural(model.windows, 'window')}"
+    tiles = tuple(_tile(LABELS[column], difference, reach, behind) for column, difference in differences.items())
+    return f"{model.name} \N{MINUS SIGN} {other.name}", tiles
+
+
+def _results(row: Row) -> str:
+    return f"{plural(len(row.results), 'result')} of {row.name}"
+
+
+def _tile(label: str, difference: Estimate, reach: float, behind: str) -> Tile:
+    def place(value: float) -> float:
+        return round(50 + 50 * (value if value == value else difference.value) / reach, 1)
+
+    tone = verdict(difference)
+    title = f"{label}: {behind}; {interval_phrase(difference, with_sign=True)}"
+    if difference.value != difference.value:
+        return Tile(label, signed(difference.value), "", tone, "absent", 50.0, 50.0, 50.0, title)
+    note = interval(difference, with_sign=True) or "no interval"
+    low, high, at = place(difference.low), place(difference.high), place(difference.value)
+    return Tile(label, signed(difference.value), note, tone, _WORDS[tone], low, high, at, title)
+
+
+def _pair(found: Headline | None) -> tuple[Row | None, Row | None]:
+    """Choose the two rows that the head of the page compares, a baseline as the second."""
+    if found is None:
+        return None, None
+    if found.rival is not None and found.best.is_baseline and not found.rival.is_baseline:
+        return found.rival, found.best
+    return found.best, found.reference or found.rival
+
+
+def _kind(best: Row, rival: Row) -> str:
+    if best.is_baseline == rival.is_baseline:
+        return "the runner-up"
+    return "the best baseline" if rival.is_baseline else "the best model that is no baseline"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

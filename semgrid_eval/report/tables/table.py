@@ -1,0 +1,94 @@
+"""What a table on the page is made of, and how numbers are written in it."""
+
+import math
+from dataclasses import dataclass
+
+from semgrid_eval.report.estimates.bootstrap import LEVEL, Estimate
+from semgrid_eval.report.rows.pairing import verdict
+
+ABSENT = "\N{EN DASH}"
+MINUS = "\N{MINUS SIGN}"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell: its text, the value it sorts by, a small second line, a tooltip and a tone for its style."""
+
+    text: str
+    sort: float | None = None
+    note: str = ""
+    title: str = ""
+    tone: str = ""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of a table: its header, a kind for its style, and its cells."""
+
+    header: str
+    cells: tuple[Cell, ...]
+    kind: str = ""
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: each body is a group of lines that stay together when the table is sorted by their first line."""
+
+    name: str
+    caption: str
+    corner: str
+    columns: tuple[tuple[str, str], ...]  # label and small second line
+    bodies: tuple[tuple[Line, ...], ...]
+
+
+def number(value: float) -> str:
+    """Write an IoU with three digits, a dash where it is absent."""
+    return f"{value:.3f}" if math.isfinite(value) else ABSENT
+
+
+def signed(value: float) -> str:
+    """Write a difference with its sign; none at all has no sign."""
+    if value == 0:
+        return "0.000"
+    return f"{value:+.3f}".replace("-", MINUS) if math.isfinite(value) else ABSENT
+
+
+def interval(estimate: Estimate, *, with_sign: bool = False) -> str:
+    """Write an interval, empty where there is none."""
+    if not math.isfinite(estimate.low):
+        return ""
+    if with_sign:
+        return f"{signed(estimate.low)} to {signed(estimate.high)}"
+    return f"{number(estimate.low)}\N{EN DASH}{number(estimate.high)}"
+
+
+def interval_phrase(estimate: Estimate, *, with_sign: bool = False) -> str:
+    """Write an interval with its level, for sentences and tooltips."""
+    text = interval(estimate, with_sign=with_sign)
+    return f"{LEVEL:.0%} interval {text}" if text else "no interval"
+
+
+def plural(count: int, noun: str) -> str:
+    """Write a count with its noun."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def value_cell(estimate: Estimate, *, title: str = "", best: bool = False) -> Cell:
+    """Show a score with its interval."""
+    return Cell(number(estimate.value), _sortable(estimate.value), interval(estimate), title, "best" if best else "")
+
+
+def difference_cell(difference: Estimate, *, title: str = "") -> Cell:
+    """Show a difference with its interval, toned by its verdict."""
+    note = interval(difference, with_sign=True)
+    return Cell(signed(difference.value), _sortable(difference.value), note, title, verdict(difference))
+
+
+def plain_cell(value: float, *, title: str = "") -> Cell:
+    """Show a number without an interval."""
+    return Cell(number(value), _sortable(value), title=title)
+
+
+def _sortable(value: float) -> float | None:
+    return value if math.isfinite(value) else None

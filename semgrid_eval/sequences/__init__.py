@@ -1,1 +1,0 @@
-"""Windows of input and target grids, and batches of them."""

@@ -1,0 +1,1 @@
+"""What makes recordings: each source behind one call of the library."""

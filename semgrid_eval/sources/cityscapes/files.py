@@ -1,0 +1,155 @@
+"""Read single files of a Cityscapes tree; every fault names the file and, where there is one, the field."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CITYSCAPES_LABELS, label_ids_from_train_ids
+from semgrid_eval.errors import InputError
+from semgrid_eval.recording.png import GRAY, PALETTE, PngHeader, decode_ids, encode_gray, read_header
+from semgrid_eval.recording.types import CameraCalibration, MotionSample
+
+MAX_FILE_BYTES = 1 << 28
+_LAST_STAMP_NS = (1 << 63) - 1
+_CAMERA_FIELDS = {
+    "fx_px": ("intrinsic", "fx"),
+    "fy_px": ("intrinsic", "fy"),
+    "u0_px": ("intrinsic", "u0"),
+    "v0_px": ("intrinsic", "v0"),
+    "baseline_m": ("extrinsic", "baseline"),
+    "x_m": ("extrinsic", "x"),
+    "y_m": ("extrinsic", "y"),
+    "z_m": ("extrinsic", "z"),
+    "roll_rad": ("extrinsic", "roll"),
+    "pitch_rad": ("extrinsic", "pitch"),
+    "yaw_rad": ("extrinsic", "yaw"),
+}
+_MOTION_FIELDS = {"speed_mps": "speed", "yaw_rate_radps": "yawRate"}
+_GPS_FIELDS = {"latitude_deg": "gpsLatitude", "longitude_deg": "gpsLongitude", "heading_deg": "gpsHeading"}
+
+
+def read_file(path: Path) -> bytes:
+    """Read a whole file of at most 256 MiB.
+
+    Raises:
+        InputError: it is missing, cannot be read or is larger.
+    """
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise InputError(f"is larger than {MAX_FILE_BYTES >> 20} MiB", path=path)
+        return path.read_bytes()
+    except FileNotFoundError as error:
+        raise InputError("is missing", path=path) from error
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", path=path) from error
+
+
+def read_camera(path: Path) -> CameraCalibration:
+    """Read `*_camera.json`.
+
+    Raises:
+        InputError: it is missing or broken, or a field is missing, not finite or impossible.
+    """
+    content = _read_object(path)
+    values = {name: _number(content, path, *place) for name, place in _CAMERA_FIELDS.items()}
+    try:
+        return CameraCalibration(**values)
+    except InputError as error:
+        field = error.field or ""
+        raise InputError(
+            str(error).removeprefix(f"{field}: "), path=path, field=".".join(_CAMERA_FIELDS[field])
+        ) from error
+
+
+def read_vehicle(path: Path, stamp_ns: int) -> MotionSample:
+    """Read `*_vehicle.json`, which holds for the time of its frame; GPS fields may be absent or null.
+
+    Raises:
+        InputError: it is missing or broken, or a field is missing or not finite.
+    """
+    content = _read_object(path)
+    motion = {name: _number(content, path, field) for name, field in _MOTION_FIELDS.items()}
+    given = {name: field for name, field in _GPS_FIELDS.items() if content.get(field) is not None}
+    gps = {name: _number(content, path, field) for name, field in given.items()}
+    return MotionSample(stamp_ns=stamp_ns, **motion, **gps)
+
+
+def read_stamp(path: Path) -> int:
+    """Read `*_timestamp.txt`: integer nanoseconds.
+
+    Raises:
+        InputError: it is missing or no such number.
+    """
+    text = read_file(path).strip()
+    if not text.isdigit() or len(text) > 19 or int(text) > _LAST_STAMP_NS:
+        shown = text[:40].decode(errors="replace")
+        raise InputError(f"{shown!r} is no time stamp in integer nanoseconds", path=path)
+    return int(text)
+
+
+def read_picture(path: Path, bit_depth: int, *, gray: bool) -> tuple[bytes, PngHeader]:
+    """Read a PNG file undecoded, with its header.
+
+    Raises:
+        InputError: it is missing or damaged, of another bit depth, or not gray though it must be.
+    """
+    data = read_file(path)
+    header = read_header(data, path)
+    if header.bit_depth != bit_depth or (gray and header.colour_type != GRAY):
+        raise InputError(f"is {header}; {bit_depth} bit{' gray' if gray else ''} is needed", path=path)
+    return data, header
+
+
+def read_label(path: Path, *, train_ids: bool) -> tuple[bytes, PngHeader]:
+    """Read a label image as an 8-bit PNG file of label ids, gray or palette; label ids of 8 bits stay undecoded.
+
+    Raises:
+        InputError: it is missing or damaged, or neither gray nor palette of at most 8 bits.
+    """
+    data = read_file(path)
+    header = read_header(data, path)
+    if header.bit_depth == 8 and header.colour_type in (GRAY, PALETTE) and not train_ids:
+        return data, header
+    ids = decode_ids(data, path)
+    return encode_gray(_label_ids(ids, path) if train_ids else ids), header
+
+
+def _label_ids(train_ids: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
+    known = [label.train_id for label in CITYSCAPES_LABELS]  # 255, which stands for none, among them
+    strange = np.setdiff1d(train_ids, known)
+    if len(strange):
+        raise InputError(f"holds {strange[0]}, which is no train id; are these label ids?", path=path)
+    return label_ids_from_train_ids()[train_ids]
+
+
+def _read_object(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(read_file(path))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"is not valid JSON: {error}", path=path) from error
+    if not isinstance(content, dict):
+        raise InputError("is no JSON object", path=path)
+    return content
+
+
+def _number(content: dict[str, Any], path: Path, *place: str) -> float:
+    """Return the finite number at a place in nested objects."""
+    field = ".".join(place)
+    value: Any = content
+    for key in place:
+        if not isinstance(value, dict) or key not in value:
+            raise InputError("is missing", path=path, field=field)
+        value = value[key]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{str(value)[:40]!r} is no number", path=path, field=field)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"{number} is not a finite number", path=path, field=field)
+    return number

@@ -1,0 +1,163 @@
+"""One recording of a Cityscapes tree: its files, their digest, and the moments that they give."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.files import digest_files, digest_value
+from semgrid_eval.recording.png import PngHeader
+from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment, Recording
+from semgrid_eval.sources.cityscapes.files import (
+    read_camera,
+    read_file,
+    read_label,
+    read_picture,
+    read_stamp,
+    read_vehicle,
+)
+
+_CONVERSION_VERSION = 1  # to be raised when the same files give another recording
+
+
+@dataclass(frozen=True)
+class SequenceFrame:
+    """The files of one frame; required ones may be missing, which reading them reports."""
+
+    image: Path
+    disparity: Path
+    vehicle: Path
+    timestamp: Path
+    camera: Path | None
+    labels: tuple[Path, ...]  # more than one is a fault
+
+    def required(self) -> tuple[Path, ...]:
+        """List what every frame must have."""
+        return self.image, self.disparity, self.vehicle, self.timestamp
+
+    def present(self) -> tuple[Path, ...]:
+        """List all files."""
+        return (*self.required(), *(() if self.camera is None else (self.camera,)), *self.labels)
+
+
+@dataclass(frozen=True)
+class CityscapesSequence:
+    """One recording of a Cityscapes tree, found but not read yet.
+
+    Args:
+        name: that of its first frame.
+        split: the folder that it lies in.
+        camera_name: what its camera shall be called in the log.
+        frames: in the order of their numbers.
+        lost: where the image of the first lost frame should be; None where the numbers have no gap.
+        train_ids: whether label images hold train ids instead of label ids.
+    """
+
+    name: str
+    split: str
+    camera_name: str
+    frames: tuple[SequenceFrame, ...]
+    lost: Path | None
+    train_ids: bool
+
+    def digest(self) -> str:
+        """Digest the bytes of all files and the options; computed once.
+
+        Raises:
+            InputError: a file is missing or cannot be read.
+        """
+        return self._digest
+
+    def recording(self) -> Recording:
+        """Return the recording; it reads its pictures only while it is streamed.
+
+        Raises:
+            InputError: a frame is lost, a file is missing, or calibration or time stamps are at fault.
+        """
+        digest = self.digest()
+        stamps_ns = self._stamps_ns()
+        return Recording(
+            name=self.name,
+            dataset="cityscapes",
+            split=self.split,
+            calibrations={self.camera_name: self._calibration()},
+            source_digest=digest,
+            moments=lambda: self._moments(stamps_ns),
+            source_files={f"{self.camera_name}_camera.json": read_file(self._camera_files[0])},
+        )
+
+    @cached_property
+    def _digest(self) -> str:
+        self._require_files()
+        options = [_CONVERSION_VERSION, self.name, self.split, self.camera_name, self.train_ids]
+        files = [[path.name for path in frame.present()] for frame in self.frames]
+        content = digest_files(path for frame in self.frames for path in frame.present())
+        return digest_value([options, files, content])
+
+    @property
+    def _camera_files(self) -> list[Path]:
+        return [frame.camera for frame in self.frames if frame.camera is not None]
+
+    def _require_files(self) -> None:
+        if self.lost is not None:
+            raise InputError("is missing: a gap in the numbering", path=self.lost)
+        for path in (path for frame in self.frames for path in frame.required()):
+            if not path.is_file():
+                raise InputError("is missing", path=path)
+        for frame in self.frames:
+            if len(frame.labels) > 1:
+                raise InputError(f"is one of {len(frame.labels)} label images of its frame", path=frame.labels[0])
+        if not self._camera_files:
+            expected = sibling(self.frames[0].image, "camera", "_camera.json")
+            raise InputError("is missing, as for every frame of this sequence; one is needed", path=expected)
+
+    def _calibration(self) -> CameraCalibration:
+        first, *others = self._camera_files
+        calibration = read_camera(first)
+        for other in others:
+            if read_camera(other) != calibration:
+                raise InputError(f"differs from {first.name}; a sequence has one calibration", path=other)
+        return calibration
+
+    def _stamps_ns(self) -> list[int]:
+        stamps_ns = [read_stamp(frame.timestamp) for frame in self.frames]
+        for frame, (before_ns, now_ns) in zip(self.frames[1:], pairwise(stamps_ns), strict=True):
+            if now_ns <= before_ns:
+                raise InputError(f"{now_ns} ns is not after the frame before, {before_ns} ns", path=frame.timestamp)
+        return stamps_ns
+
+    def _moments(self, stamps_ns: Sequence[int]) -> Iterator[Moment]:
+        first: PngHeader | None = None
+        for frame, stamp_ns in zip(self.frames, stamps_ns, strict=True):
+            image, size = read_picture(frame.image, 8, gray=False)
+            disparity, disparity_size = read_picture(frame.disparity, 16, gray=True)
+            first = first or size
+            _require_size(frame.image, size, first)
+            _require_size(frame.disparity, disparity_size, first)
+            label = None
+            for path in frame.labels:
+                label, label_size = read_label(path, train_ids=self.train_ids)
+                _require_size(path, label_size, first)
+            picture = CameraFrame(stamp_ns, image_png=image, disparity_png=disparity, label_png=label)
+            yield Moment(stamp_ns, {self.camera_name: picture}, (read_vehicle(frame.vehicle, stamp_ns),))
+
+
+def frame_name(image: Path) -> str:
+    """Return `<city>_<sequence>_<number>`."""
+    return image.name.removesuffix("_leftImg8bit.png")
+
+
+def sibling(image: Path, channel: str, suffix: str) -> Path:
+    """Return where the file of another channel lies that belongs to an image."""
+    split, city = image.parent.parent, image.parent
+    return split.parent.parent / channel / split.name / city.name / f"{frame_name(image)}{suffix}"
+
+
+def _require_size(path: Path, header: PngHeader, first: PngHeader) -> None:
+    if header[:2] != first[:2]:
+        raise InputError(
+            f"is {header.width} x {header.height}, but the sequence began with {first.width} x {first.height}",
+            path=path,
+        )

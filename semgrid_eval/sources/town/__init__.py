@@ -1,0 +1,1 @@
+"""The simulated town: traffic by SUMO, pictures by ray casting."""

@@ -1,0 +1,88 @@
+"""Who travels in a town, and when: SUMO's random trips, thinned out over time so that the streets fill at once."""
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from semgrid_eval.sources.town.kinds import TownKind
+from semgrid_eval.sources.town.road_users import ROAD_USERS, RoadUser
+from semgrid_eval.sources.town.sumo import run_tool
+
+FILL_S = 24.0
+"""Time in which the streets are filled; from then on as many depart as arrive."""
+TYPES_FILE = "types.add.xml"
+
+
+@dataclass(frozen=True)
+class _Stream:
+    """Trips over one kind of lane: who may travel it, how many at a time, and how long a trip takes."""
+
+    permission: str
+    users: dict[RoadUser, float]  # how many a kilometre of street
+    trip_s: float
+    options: tuple[str, ...]
+
+    @property
+    def file(self) -> str:
+        return f"{self.permission}.trips.xml"
+
+
+def write_demand(network: Path, kind: TownKind, street_km: float, end_s: float, rng: np.random.Generator) -> list[str]:
+    """Write types and trips of everybody beside the network and return the names of the files of trips.
+
+    Raises:
+        InputError: SUMO's tool failed.
+    """
+    _write_types(network.parent / TYPES_FILE)
+    streams = _streams(kind)
+    for stream in streams:
+        _write_trips(network, stream, street_km, end_s, rng)
+    return [stream.file for stream in streams]
+
+
+def _streams(kind: TownKind) -> list[_Stream]:
+    densities = {"passenger": kind.cars, "truck": kind.trucks, "bus": kind.buses}
+    densities |= {"bicycle": kind.bicycles, "pedestrian": kind.persons}
+    users = {user: densities[user.sumo_class] * user.share for user in ROAD_USERS}
+    motor = {user: count for user, count in users.items() if user.sumo_class in ("passenger", "truck", "bus")}
+    far = ("--min-distance", "200")
+    streams = [_Stream("passenger", motor, 75.0, far)]
+    for permission, trip_s, options in (("bicycle", 90.0, far), ("pedestrian", 170.0, ("--persons",))):
+        chosen = {user: count for user, count in users.items() if user.sumo_class == permission}
+        streams.append(_Stream(permission, chosen, trip_s, options))
+    return streams
+
+
+def _write_types(path: Path) -> None:
+    root = ET.Element("additional")
+    for user in ROAD_USERS:
+        size = {"length": str(user.length_m), "width": str(user.width_m), "height": str(user.height_m)}
+        size = {} if user.sumo_class == "pedestrian" else size  # SUMO's own size steers how people evade each other
+        ET.SubElement(root, "vType", {"id": user.name, "vClass": user.sumo_class, **size})
+    ET.ElementTree(root).write(path)
+
+
+def _write_trips(network: Path, stream: _Stream, street_km: float, end_s: float, rng: np.random.Generator) -> None:
+    """Draw trips, then set who makes each and when: enough to fill the streets at once, then as many as arrive."""
+    users = list(stream.users)
+    weights = np.array(list(stream.users.values()))
+    at_a_time = max(1, round(float(weights.sum()) * street_km))
+    count = at_a_time + round(at_a_time * end_s / stream.trip_s)
+    options = ["-n", network.name, "-o", stream.file, "--seed", str(int(rng.integers(1 << 30)))]
+    options += ["--prefix", stream.permission, "--begin", "0", "--end", str(count), "--period", "1", "--no-validate"]
+    run_tool("randomTrips", [*options, "--edge-permission", stream.permission, *stream.options], network.parent)
+    path = network.parent / stream.file
+    tree = ET.parse(path)
+    trips = [node for node in tree.getroot() if node.tag in ("trip", "person")]
+    for index, trip in enumerate(trips):
+        is_first = index < at_a_time
+        late_s = (index - at_a_time) * stream.trip_s / at_a_time
+        trip.set("depart", f"{FILL_S * index / at_a_time if is_first else FILL_S + late_s:.2f}")
+        trip.set("type", users[int(rng.choice(len(users), p=weights / weights.sum()))].name)
+        if trip.tag == "person":
+            trip.set("departPos", "random")
+        else:
+            trip.attrib.update(departLane="best", departSpeed="max", departPos="random_free" if is_first else "base")
+    tree.write(path)

@@ -1,0 +1,122 @@
+"""The traffic of a town over time: who is where at any moment, from arrays that can be mapped from disk."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.sources.town.road_users import ROAD_USERS, Shape
+
+_JUMP_M = 1.0  # nobody moves that far in one step of 59 ms; SUMO's pedestrians now and then do
+_LENGTHS_M = np.array([user.length_m for user in ROAD_USERS], np.float32)
+_IS_PERSON = np.array([user.shape is Shape.PERSON for user in ROAD_USERS])
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everybody at one moment; all arrays have one row an actor.
+
+    Args:
+        actor: (A,) index of the actor in its town.
+        type_index: (A,) index into `ROAD_USERS`.
+        centre_m: (A, 2) centre of the footprint in the map frame.
+        yaw_rad: (A,) counter-clockwise from the map's x axis.
+        velocity_mps: (A, 2) in the map frame.
+    """
+
+    actor: NDArray[np.int32]
+    type_index: NDArray[np.uint8]
+    centre_m: NDArray[np.float64]
+    yaw_rad: NDArray[np.float64]
+    velocity_mps: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.actor)
+
+    def where(self, keep: NDArray[np.bool_]) -> "Snapshot":
+        """Return the actors for which `keep` (A,) holds."""
+        return Snapshot(*(getattr(self, entry.name)[keep] for entry in fields(self)))
+
+
+@dataclass(frozen=True)
+class Traffic:
+    """SUMO's trajectories, sorted by time; rows `offsets[i]` to `offsets[i + 1]` belong to `times_s[i]`.
+
+    Args:
+        times_s: (T,) times of the steps.
+        offsets: (T + 1,) first row of each step.
+        actor: (R,) index of the actor.
+        position_m: (R, 2) middle of the front bumper in the map frame (of a person: the person).
+        heading_rad: (R,) counter-clockwise from the map's x axis.
+        speed_mps: (R,) along the heading.
+        actor_types: (A,) index into `ROAD_USERS` of each actor.
+    """
+
+    times_s: NDArray[np.float64]
+    offsets: NDArray[np.int64]
+    actor: NDArray[np.int32]
+    position_m: NDArray[np.float32]
+    heading_rad: NDArray[np.float32]
+    speed_mps: NDArray[np.float32]
+    actor_types: NDArray[np.uint8]
+
+    def save(self, folder: Path) -> None:
+        """Write one `.npy` file an array."""
+        for entry in fields(self):
+            np.save(folder / f"{entry.name}.npy", getattr(self, entry.name))
+
+    @classmethod
+    def load(cls, folder: Path) -> "Traffic":
+        """Map the arrays from disk; only what is touched is read."""
+        return cls(*(np.load(folder / f"{entry.name}.npy", mmap_mode="r") for entry in fields(cls)))
+
+    def step_before(self, time_s: float) -> int:
+        """Return the step at or before a time, such that a next step exists."""
+        return int(np.clip(np.searchsorted(self.times_s, time_s, "right") - 1, 0, len(self.times_s) - 2))
+
+    def at(self, time_s: float) -> Snapshot:
+        """Interpolate everybody who is there in the step before and the step after to a time."""
+        step = self.step_before(time_s)
+        before, after = self._rows(step), self._rows(step + 1)
+        _, first, second = np.intersect1d(self.actor[before], self.actor[after], True, return_indices=True)
+        rows, next_rows = first + before.start, second + after.start
+        span_s = self.times_s[step + 1] - self.times_s[step]
+        share = float((time_s - self.times_s[step]) / span_s)
+        actor = np.asarray(self.actor[rows])
+        start, end = self._centres(rows), self._centres(next_rows)
+        moved = end - start
+        jumped = np.linalg.norm(moved, axis=1) > _JUMP_M
+        moved[jumped] = 0.0
+        yaw = self.heading_rad[rows].astype(np.float64)
+        turn = _wrapped(self.heading_rad[next_rows].astype(np.float64) - yaw)
+        return Snapshot(
+            actor, np.asarray(self.actor_types[actor]), start + share * moved, yaw + share * turn, moved / span_s
+        )
+
+    def track(self, actor: int, first_step: int, end_step: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return one actor's front positions (S, 2) and headings (S,) over steps; NaN where it is not there."""
+        positions = np.full((end_step - first_step, 2), np.nan)
+        headings = np.full(end_step - first_step, np.nan)
+        rows = np.arange(self.offsets[first_step], self.offsets[end_step])
+        rows = rows[self.actor[rows[0] : rows[-1] + 1] == actor] if len(rows) else rows
+        steps = np.searchsorted(self.offsets, rows, "right") - 1 - first_step
+        positions[steps] = self.position_m[rows]
+        headings[steps] = np.unwrap(self.heading_rad[rows].astype(np.float64))
+        return positions, headings
+
+    def _rows(self, step: int) -> slice:
+        return slice(int(self.offsets[step]), int(self.offsets[step + 1]))
+
+    def _centres(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the centres (N, 2) of the footprints: half a length behind the front bumper."""
+        types = self.actor_types[self.actor[rows]]
+        back_m = np.where(_IS_PERSON[types], 0.0, 0.5 * _LENGTHS_M[types])
+        yaw = self.heading_rad[rows].astype(np.float64)
+        ahead = np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
+        return np.asarray(self.position_m[rows].astype(np.float64) - back_m[:, None] * ahead)
+
+
+def _wrapped(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bring angles to -pi..pi."""
+    return (angle_rad + np.pi) % (2.0 * np.pi) - np.pi

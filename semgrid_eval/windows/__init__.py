@@ -1,0 +1,1 @@
+"""Windows: which frames are inputs and target, and batches of them."""

@@ -1,0 +1,301 @@
+"""Batches of windows: grids gathered, shifted by the ego motion (T2) and masked, without a loop over windows."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from semgrid_eval.classes import UNKNOWN
+from semgrid_eval.errors import InputError
+from semgrid_eval.files import DIGEST_CHARACTERS
+from semgrid_eval.grids.spec import TARGET_SENSOR
+from semgrid_eval.windows.plan import Window
+
+if TYPE_CHECKING:  # building grids needs the log readers; using built ones does not
+    from semgrid_eval.grids.build import GridRecording
+
+
+@dataclass(frozen=True)
+class GridData:
+    """The grids of all recordings on one device, recordings one after the other along F.
+
+    Args:
+        grids: (S, F, H, W) uint8 class ids.
+        sensors: names along S.
+        recordings: names of the recordings, and `logs` the paths of their logs.
+        digests: of those logs.
+        first_frames: (R + 1,) where each recording begins along F, and F.
+        stamps_ns: (F,) int64.
+        position_m: (F, 2) float64, forward and left in the grid orientation of the frame's own recording.
+        cell_m: edge of a cell.
+        actors: for each recording (its F, H, W) flags of true actors, None where its log does not hold the truth.
+            They stay on the host: scores are split by them, and nothing is predicted from them.
+    """
+
+    grids: Tensor
+    sensors: tuple[str, ...]
+    recordings: tuple[str, ...]
+    logs: tuple[str, ...]
+    digests: tuple[str, ...]
+    first_frames: NDArray[np.int64]
+    stamps_ns: NDArray[np.int64]
+    position_m: NDArray[np.float64]
+    cell_m: float
+    actors: tuple[NDArray[np.uint8] | None, ...] = ()
+
+    def to(self, device: torch.device) -> "GridData":
+        """Give the same data with its grids on another device."""
+        return replace(self, grids=self.grids.to(device))
+
+    @property
+    def frame_counts(self) -> list[int]:
+        """Frames of each recording."""
+        return [int(count) for count in np.diff(self.first_frames)]
+
+    def locate(self, frames: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Find frames, indices along F: (N,) -> the recording of each (N,) and the index of the frame there (N,)."""
+        owners = np.searchsorted(self.first_frames, frames, side="right") - 1
+        return owners, frames - self.first_frames[owners]
+
+    def sensor_index(self, name: str) -> int:
+        """Find a sensor.
+
+        Raises:
+            InputError: the grids have no such sensor.
+        """
+        if name not in self.sensors:
+            raise InputError(f"the grids have no sensor {name!r}, only {', '.join(self.sensors)}", field="sensors")
+        return self.sensors.index(name)
+
+
+@dataclass(frozen=True)
+class WindowBatch:
+    """What a predictor sees of B windows, and what it is scored on.
+
+    Args:
+        past: (B, S, T, H, W) uint8 class ids, oldest first; in the target's place if the row translates, else as seen.
+        sensors: names along S.
+        shift_cells: (B, T, 2) int64 rows and columns by which ego motion moves each input into the target's place.
+        lead_s: (B, T) float32 time from each input to the target.
+        target: (B, H, W) uint8.
+        mask: (B, H, W) bool, M: seen in an aligned input, yet unknown in the target.
+    """
+
+    past: Tensor
+    sensors: tuple[str, ...]
+    shift_cells: Tensor
+    lead_s: Tensor
+    target: Tensor
+    mask: Tensor
+
+
+@dataclass(frozen=True)
+class WindowSet:
+    """N windows over grid data; frames are indices along F.
+
+    Args:
+        inputs: (N, T) int64; target_frames: (N,) int64; shift_cells: (N, T, 2) int64; lead_s: (N, T) float32.
+        sensor_rows: (S,) int64 where the input sensors lie in the data.
+        translate: whether inputs are moved into the target's place.
+    """
+
+    data: GridData
+    sensors: tuple[str, ...]
+    sensor_rows: Tensor
+    translate: bool
+    inputs: Tensor
+    target_frames: Tensor
+    shift_cells: Tensor
+    lead_s: Tensor
+
+    def __len__(self) -> int:
+        return len(self.target_frames)
+
+    @property
+    def grids_per_window(self) -> int:
+        """How many grids a predictor sees of a window, S times T."""
+        return len(self.sensors) * self.inputs.shape[1]
+
+    def to(self, device: torch.device) -> "WindowSet":
+        """Give the same windows with all tensors on another device."""
+        tensors = ("sensor_rows", "inputs", "target_frames", "shift_cells", "lead_s")
+        return replace(self, data=self.data.to(device), **{name: getattr(self, name).to(device) for name in tensors})
+
+    def batch(self, chosen: Tensor | slice) -> WindowBatch:
+        """Gather the chosen windows: (B,) int64 or a slice."""
+        shift_cells = self.shift_cells[chosen]
+        seen = self.data.grids[self.sensor_rows[None, :, None], self.inputs[chosen][:, None, :]]
+        aligned = shift_grids(seen, shift_cells[:, None])
+        target = self.data.grids[self.data.sensor_index(TARGET_SENSOR), self.target_frames[chosen]]
+        return WindowBatch(
+            past=aligned if self.translate else seen,
+            sensors=self.sensors,
+            shift_cells=shift_cells,
+            lead_s=self.lead_s[chosen],
+            target=target,
+            mask=covered_without_truth(aligned, target),
+        )
+
+    def actors(self, chosen: slice) -> NDArray[np.uint8] | None:
+        """Flag where true actors are at the target's time, or were in an input: -> (B, H, W).
+
+        The inputs' footprints are moved into the target's place, like their grids: there a model without any idea of
+        motion leaves a ghost. Windows of recordings without the truth have no flags; None where no recording has it.
+        """
+        if all(flags is None for flags in self.data.actors):
+            return None
+        found = self._flags_of(self.target_frames[chosen].cpu().numpy())
+        for place in range(self.inputs.shape[1]):
+            flags = torch.from_numpy(self._flags_of(self.inputs[chosen, place].cpu().numpy()))
+            found |= shift_grids(flags, self.shift_cells[chosen, place].cpu()).numpy()
+        return found
+
+    def _flags_of(self, frames: NDArray[np.int64]) -> NDArray[np.uint8]:
+        result = np.zeros((len(frames), *self.data.grids.shape[-2:]), np.uint8)
+        for flags, owner, frame in zip(result, *self.data.locate(frames), strict=True):
+            if (known := self.data.actors[owner]) is not None:
+                flags[:] = known[frame]
+        return result
+
+    def batches(self, size: int) -> Iterator[WindowBatch]:
+        """Pass over all windows in order, `size` at a time."""
+        for start in range(0, len(self), size):
+            yield self.batch(slice(start, start + size))
+
+    def digest(self) -> str:
+        """Digest what determines every batch, given how logs become grids: logs, sensors, translation and frames."""
+        total = hashlib.sha256(repr((self.data.digests, self.data.cell_m, self.sensors, self.translate)).encode())
+        for part in (self.inputs, self.target_frames):
+            total.update(repr(tuple(part.shape)).encode() + part.cpu().numpy().tobytes())
+        return total.hexdigest()[:DIGEST_CHARACTERS]
+
+
+def stack_recordings(
+    recordings: Sequence["GridRecording"], *, cell_m: float, sensors: Sequence[str] | None = None
+) -> GridData:
+    """Put recordings into one block of memory; `sensors` limits it to those and the target's (default: all).
+
+    Raises:
+        InputError: there is no recording, or one lacks a sensor or has grids of another size.
+    """
+    if not recordings:
+        raise InputError("there are no grids to take windows from")
+    kept = tuple(dict.fromkeys([*(sensors or recordings[0].sensors), TARGET_SENSOR]))
+    size = recordings[0].grids.shape[-2:]
+    first_frames = np.concatenate([[0], np.cumsum([len(entry.stamps_ns) for entry in recordings])]).astype(np.int64)
+    grids = torch.empty((len(kept), int(first_frames[-1]), *size), dtype=torch.uint8)
+    for entry, first in zip(recordings, first_frames, strict=False):
+        _check_recording(entry, kept, size)
+        for row, name in enumerate(kept):
+            source = np.ascontiguousarray(entry.grids[entry.sensors.index(name)])
+            grids[row, first : first + len(source)] = torch.from_numpy(source)
+    return GridData(
+        grids=grids,
+        sensors=kept,
+        recordings=tuple(entry.name for entry in recordings),
+        logs=tuple(entry.log for entry in recordings),
+        digests=tuple(entry.digest for entry in recordings),
+        first_frames=first_frames,
+        stamps_ns=np.concatenate([entry.stamps_ns for entry in recordings]),
+        position_m=np.concatenate([entry.position_m for entry in recordings]),
+        cell_m=cell_m,
+        actors=tuple(entry.actors for entry in recordings),
+    )
+
+
+def select_windows(
+    data: GridData, windows: Sequence[Window], *, sensors: Sequence[str], translate: bool = True
+) -> WindowSet:
+    """Resolve windows of equal shape against grid data, input grids coming from `sensors`.
+
+    Raises:
+        InputError: there is no window, a window leaves its recording, or a sensor does not exist.
+    """
+    if not windows:
+        raise InputError("there are no windows")
+    recording = np.array([window.recording for window in windows])
+    frames = np.array([(*window.input_frames, window.target_frame) for window in windows])
+    frames += data.first_frames[recording][:, None]
+    _check_frames(data, windows, frames, recording)
+    inputs, target = frames[:, :-1], frames[:, -1]
+    moved_m = data.position_m[target][:, None] - data.position_m[inputs]
+    lead_ns = data.stamps_ns[target][:, None] - data.stamps_ns[inputs]
+    device = data.grids.device
+    return WindowSet(
+        data=data,
+        sensors=tuple(sensors),
+        sensor_rows=torch.tensor([data.sensor_index(name) for name in sensors], device=device),
+        translate=translate,
+        inputs=torch.from_numpy(inputs.copy()).to(device),
+        target_frames=torch.from_numpy(target.copy()).to(device),
+        shift_cells=torch.from_numpy(shift_in_cells(moved_m, data.cell_m)).to(device),
+        lead_s=torch.from_numpy((lead_ns * 1e-9).astype(np.float32)).to(device),
+    )
+
+
+def shift_in_cells(moved_m: NDArray[np.float64], cell_m: float) -> NDArray[np.int64]:
+    """Round the way of the ego vehicle (..., 2: forward, left) to the cells (rows, columns) that content moves by.
+
+    Driving forward brings content nearer (down the rows); driving left moves it right (up the columns).
+    """
+    return np.rint(moved_m / cell_m).astype(np.int64)
+
+
+def shift_grids(grids: Tensor, shift_cells: Tensor) -> Tensor:
+    """Move content by whole cells (T2): (..., H, W) by (..., 2) rows and columns -> (..., H, W).
+
+    What leaves the grid is lost, and cells that enter it are unknown.
+    """
+    rows, columns = grids.shape[-2:]
+    source_row = torch.arange(rows, device=grids.device) - shift_cells[..., 0:1]  # (..., H)
+    source_column = torch.arange(columns, device=grids.device) - shift_cells[..., 1:2]  # (..., W)
+    inside = _within(source_row, rows)[..., :, None] & _within(source_column, columns)[..., None, :]
+    source = source_row.clamp(0, rows - 1)[..., :, None] * columns + source_column.clamp(0, columns - 1)[..., None, :]
+    flat = grids.flatten(-2)
+    moved = flat.gather(-1, source.flatten(-2).expand(flat.shape)).reshape(grids.shape)
+    return torch.where(inside, moved, UNKNOWN)
+
+
+def covered_without_truth(aligned: Tensor, target: Tensor) -> Tensor:
+    """Compute the mask M: aligned (B, S, T, H, W) and target (B, H, W) -> (B, H, W) bool.
+
+    The paper's M = M_covered - M_target; the target's own cells of M_covered cancel out.
+    """
+    return (aligned != UNKNOWN).flatten(1, 2).any(dim=1) & (target == UNKNOWN)
+
+
+def window_arrays(windows: WindowSet, *, batch: int = 64) -> dict[str, NDArray[np.uint8] | NDArray[np.bool_]]:
+    """Give what a run keeps: aligned inputs (N, S, T, H, W), target, mask and, with the truth, actors (N, H, W)."""
+    aligned = replace(windows, translate=True)
+    parts = [(part.past.cpu(), part.target.cpu(), part.mask.cpu()) for part in aligned.batches(batch)]
+    inputs, target, mask = (torch.cat(column).numpy() for column in zip(*parts, strict=True))
+    actors = windows.actors(slice(None))
+    return {"inputs": inputs, "target": target, "mask": mask, **({} if actors is None else {"actors": actors})}
+
+
+def _within(index: Tensor, size: int) -> Tensor:
+    return (index >= 0) & (index < size)
+
+
+def _check_recording(entry: "GridRecording", sensors: tuple[str, ...], size: tuple[int, ...]) -> None:
+    for name in sensors:
+        if name not in entry.sensors:
+            raise InputError(f"the grids of {entry.name} have no sensor {name!r}, only {', '.join(entry.sensors)}")
+    if entry.grids.shape[-2:] != size:
+        raise InputError(f"the grids of {entry.name} are {entry.grids.shape[-2:]}, and the first ones are {size}")
+
+
+def _check_frames(
+    data: GridData, windows: Sequence[Window], frames: NDArray[np.int64], recording: NDArray[np.int64]
+) -> None:
+    first, last = data.first_frames[recording], data.first_frames[recording + 1] - 1
+    outside = (frames.min(axis=1) < first) | (frames.max(axis=1) > last)
+    if outside.any():
+        window = windows[int(outside.argmax())]
+        name, count = data.recordings[window.recording], data.frame_counts[window.recording]
+        raise InputError(f"{name} has {count} frames, and a window needs frame {window.target_frame}")

@@ -1,0 +1,252 @@
+import filecmp
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+
+import pandas as pd
+import pytest
+from support.fake_run import HOSTILE, FakeRow, make_fake_run
+
+from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.errors import InputError, ResultError
+from semgrid_eval.files import read_json
+from semgrid_eval.report.page.write import write_report
+
+VOID = {"meta", "link", "img", "input", "br"}
+
+
+class _Page(HTMLParser):
+    """Collects what a test asks for and insists that every element is closed where it should be."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.words = [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] not in ("script", "style"):
+            self.words.append(data)
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.tags if name == tag]
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.words).split())
+
+
+def _read(path):
+    return _Page(path.read_text(encoding="utf-8"))
+
+
+def _report_of(tmp_path, **kwargs):
+    return write_report(make_fake_run(tmp_path / "run", recordings=2, windows=1, **kwargs))
+
+
+def test_the_page_answers_in_order(page):
+    titles = [a["id"] for a in _read(page).all("section")]
+    assert titles[:3] == ["summary", "categories", "classes"]
+    assert titles[-3:] == ["examples", "failures", "provenance"]
+
+
+def test_the_page_is_well_formed_and_accessible(page):
+    found = _read(page)
+    assert found.all("html") == [{"lang": "en"}]
+    assert all(image["alt"] for image in found.all("img"))
+    assert all(image["src"].startswith("data:image/") for image in found.all("img"))
+    ids = [a["id"] for _, a in found.tags if "id" in a]
+    assert len(ids) == len(set(ids))
+    assert {a["href"][1:] for a in found.all("a")} <= set(ids)
+    assert len(found.all("caption")) == len(found.all("table"))
+    assert all(a.get("scope") in ("col", "row") for a in found.all("th"))
+
+
+def test_the_page_needs_no_network(page):
+    text = re.sub(r'"data:[^"]*"', '""', page.read_text(encoding="utf-8"))
+    assert not re.search(r"(src|href)=\"(?!#|\")", text)
+    assert not re.search(r"@import|url\(|https?:", text)
+
+
+def test_three_example_windows_and_their_traces_are_shown(page):
+    found = _read(page)
+    assert [a["class"] for a in found.all("article")].count("window") >= 3
+    for words in ("Input 1 of 2", "Target", "BL-NT", "Certainty", "frame 20", "val/town_00"):
+        assert words in found.text
+
+
+def test_each_sensors_newest_input_is_shown(page):
+    titles = [image["alt"] for image in _read(page).all("img")]
+    for sensor in ("lower", "upper"):
+        assert f"Input 2 of 2, {sensor}, aligned to the target" in titles
+
+
+def test_a_windows_log_is_listed_under_the_same_name(page):
+    found = _read(page)
+    assert found.words.count("val/town_000.mcap") > 1
+
+
+def test_findings_stand_behind_the_classes_and_count_their_verdicts(page):
+    found = _read(page)
+    titles = [a["id"] for a in found.all("section")]
+    assert titles[titles.index("classes") + 1 :][:2] == ["findings", "moving"]
+    assert "Of 25 claims, 9 can be tested here: 4 hold, 2 do not, 3 are undecided." in found.text
+    assert "ED-DC is better than BL-DC on static classes and vehicles does not hold" in found.text
+    assert "ED-DC is better than BL-DC on moving vehicles alone holds" in found.text
+    assert "ED-NT falls behind ED-DC on small classes ED-NT" in found.text  # its row failed, so it stands as a need
+
+
+def test_failures_and_provenance_are_told(page):
+    text = _read(page).text
+    for words in (
+        "row ED-NT the loss became not a number in epoch 3",
+        "log logs/town_broken.mcap the index is missing",
+        "semgrid-eval run smoke --logs logs --out run",
+        "5 min 12 s",
+        "two shared cores",
+    ):
+        assert words in text
+
+
+def test_the_tables_hold_the_numbers_of_the_long_form(page):
+    classes = pd.read_csv(page.parent / "classes.csv")
+    row = classes[(classes.experiment == "DC") & (classes.model == "ED") & (classes["class"] == "car")]
+    assert f"{row.iou.mean():.3f}" in _read(page).text
+
+
+def test_files_beside_the_page_are_there(page):
+    names = {str(path.relative_to(page.parent)) for path in page.parent.rglob("*") if path.is_file()}
+    assert {"index.html", "classes.csv", "categories.csv", "summary.csv", "summary.md", "summary.tex"} <= names
+    for name in ("categories", "category_static", "training"):
+        assert {f"figures/{name}.png", f"figures/{name}.svg"} <= names
+
+
+def test_every_figure_names_the_table_that_it_was_drawn_from(page):
+    text = page.read_text(encoding="utf-8")
+    sources = re.findall(r"Drawn from <code>(.*?)</code>; also as <code>(.*?)</code>", text)
+    assert len(sources) > 5
+    for names in sources:
+        for name in names:
+            assert (page.parent / name).is_file()
+
+
+def test_every_number_tells_what_stands_behind_it(page):
+    cells = [a for a in _read(page).all("td") if "data-sort" in a]
+    without = {a["data-sort"] for a in cells if not a.get("title")}
+    assert len(cells) > 500
+    assert len(without) < 40  # sizes and counts, which stand for themselves
+
+
+def test_the_same_run_gives_the_same_bytes_without_torch(run, page, tmp_path):
+    code = """import sys
+from pathlib import Path
+from semgrid_eval.report.page.write import write_report
+write_report(Path(sys.argv[1]), Path(sys.argv[2]))
+assert 'torch' not in sys.modules and 'semgrid_eval.runs' not in sys.modules"""
+    again = tmp_path / "again"
+    environment = {**os.environ, "PYTHONHASHSEED": "4711"}
+    subprocess.run([sys.executable, "-c", code, run, again], check=True, env=environment)
+    names = [str(path.relative_to(again)) for path in again.rglob("*") if path.is_file()]
+    assert filecmp.cmpfiles(page.parent, again, names, shallow=False) == (names, [], [])
+    assert len(names) == sum(path.is_file() for path in page.parent.rglob("*"))
+
+
+def test_a_folder_that_is_no_report_is_left_alone(run, tmp_path):
+    (tmp_path / "thesis.tex").write_text("precious")
+    with pytest.raises(InputError, match="no report"):
+        write_report(run, tmp_path)
+    assert (tmp_path / "thesis.tex").read_text() == "precious"
+
+
+def test_a_folder_without_a_run_is_named(tmp_path):
+    with pytest.raises(ResultError, match=re.escape(str(tmp_path))):
+        write_report(tmp_path)
+
+
+def test_failed_rows_only(tmp_path):
+    page = _report_of(tmp_path, rows=(FakeRow("DC", "ED", failure="out of memory"),))
+    text = _read(page).text
+    assert "No row has a score" in text
+    assert "row ED-DC out of memory" in text
+    assert pd.read_csv(page.parent / "classes.csv").empty
+    assert read_json(page.parent / "report.json")["rows"]["ED-DC"]["scores"] == {}
+
+
+@pytest.fixture(scope="module")
+def lonely(tmp_path_factory):
+    """The page of one row and one window, in the default place, where an older report lies."""
+    run = make_fake_run(
+        tmp_path_factory.mktemp("runs") / "run", rows=(FakeRow("DC", "BL"),), recordings=1, windows=1, truth=False
+    )
+    old = run / "report"
+    old.mkdir()
+    for name in ("report.json", "index.html", "old.txt"):
+        (old / name).touch()
+    return write_report(run)
+
+
+def test_an_old_report_in_the_default_place_is_replaced(lonely):
+    assert lonely.parent.name == "report"
+    assert (lonely.parent.parent / "run.json").is_file()
+    assert not (lonely.parent / "old.txt").exists()
+
+
+def test_one_row_only(lonely):
+    text = _read(lonely).text
+    assert "BL-DC has the highest mean class IoU" in text
+    assert "no other row to compare with" in text
+    assert "No row was trained" in text
+    assert "This run lacks the rows to test any of the 25 claims" in text
+    assert "No result here knows the truth about actors" in text
+    assert pd.read_csv(lonely.parent / "regions.csv").empty
+
+
+def test_a_class_in_neither_target_nor_prediction_is_a_dash_and_empty(lonely):
+    classes = pd.read_csv(lonely.parent / "classes.csv").set_index("class")
+    absent = [name for name in CLASS_NAMES if pd.isna(classes.iou[name])]
+    assert absent
+    assert (classes.cells[absent] == 0).all()
+    assert "\N{EN DASH}" in _read(lonely).text
+    assert read_json(lonely.parent / "report.json")["rows"]["BL-DC"]["scores"][absent[0]]["value"] is None
+
+
+def test_zero_windows(tmp_path):
+    page = write_report(make_fake_run(tmp_path / "run", recordings=0))
+    text = _read(page).text
+    assert "No row has a score" in text
+    assert "row BL-DC it has no window to score" in text
+
+
+def test_a_damaged_result_fails_its_row_and_the_rest_goes_on(troubled):
+    text = _read(troubled).text
+    assert "row BL-Fuse" in text
+    assert "/counts.npz" in text
+    assert "has the highest mean class IoU" in text
+
+
+def test_names_are_shown_as_text(troubled):
+    found = _read(troubled)
+    assert len(found.all("script")) == 1
+    for name in HOSTILE:
+        assert found.text.count(name) > 3
+
+
+def test_several_runs_are_shown_side_by_side(side_by_side):
+    text = _read(side_by_side).text
+    assert "ED-DC (other) \N{MINUS SIGN} ED-DC (first)" in text
+    assert "BL-DC (first)" in text
+    for number in (1, 2):
+        assert (side_by_side.parent / f"matrix-{number}.yaml").is_file()

@@ -1,0 +1,116 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.fake_run import FakeRow, counted_row, make_fake_run
+
+from semgrid_eval.report.estimates.bootstrap import Estimate, score_rows
+from semgrid_eval.report.page.provenance import failures
+from semgrid_eval.report.page.summary import summarise
+from semgrid_eval.report.rows.load import Run, load_runs
+from semgrid_eval.report.rows.pairing import headline, reference_of, verdict
+from semgrid_eval.scores.results import NOT_RUN
+
+ROWS = (
+    FakeRow("Fuse", "BL"),
+    FakeRow("DC", "BL"),
+    FakeRow("NT", "BL", translate=False),
+    FakeRow("PH1", "BL", horizon_steps=2),
+    FakeRow("DC", "ED", 0.05, 1),
+    FakeRow("NT", "ED", 0.2, 1, translate=False),
+    FakeRow("SL3", "ED", 0.2, 1),
+    FakeRow("PH1", "ED", 0.2, 1, horizon_steps=2),
+    FakeRow("PH2", "ED", 0.2, 1, horizon_steps=3),
+)
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    run = make_fake_run(tmp_path_factory.mktemp("runs") / "run", rows=ROWS, recordings=3, windows=1)
+    return load_runs([run])[0].rows
+
+
+@pytest.mark.parametrize(
+    ("name", "reference"),
+    [
+        ("ED-DC", "BL-DC"),
+        ("ED-NT", "BL-NT"),
+        ("ED-SL3", "BL-DC"),
+        ("ED-PH1", "BL-PH1"),
+        ("ED-PH2", None),
+        ("BL-DC", None),
+    ],
+)
+def test_a_row_is_measured_against_the_baseline_of_its_question(rows, name, reference):
+    row = next(row for row in rows if row.name == name)
+    found = reference_of(row, rows)
+    assert (found.name if found else None) == reference
+
+
+def test_the_headline_compares_rows_of_one_question_only(rows):
+    found = headline(score_rows(rows, np.random.default_rng(0), draws=2))
+    assert found.best.record.horizon_steps == 1
+    assert found.rival.is_baseline != found.best.is_baseline
+
+
+def test_nothing_scored_has_no_headline():
+    assert headline({}) is None
+
+
+@pytest.mark.parametrize(
+    ("estimate", "word"),
+    [
+        (Estimate(0.1, 0.01, 0.2), "gain"),
+        (Estimate(-0.1, -0.2, -0.01), "loss"),
+        (Estimate(0.1, -0.01, 0.2), "open"),
+        (Estimate(0.1, np.nan, np.nan), "open"),
+    ],
+)
+def test_a_difference_is_decided_only_where_the_interval_excludes_zero(estimate, word):
+    assert verdict(estimate) == word
+
+
+def test_the_summary_says_who_leads_by_how_much_and_on_what_it_rests(run):
+    runs = load_runs([run])
+    scores = score_rows(runs[0].rows, np.random.default_rng(0))
+    found = headline(scores)
+    summary = summarise(runs, scores, found)
+    lead = scores["ED-DC"].mean["mean_known"] - scores["BL-Fuse"].mean["mean_known"]
+    assert summary.sentences[0].startswith(
+        "Of 4 rows with the same inputs and horizon, ED-DC has the highest mean class IoU, "
+    )
+    assert f"+{lead:.3f} over BL-Fuse, the best baseline, clearly better (95% interval +" in summary.sentences[0]
+    assert "16 windows from 8 recordings" in summary.sentences[2]
+    assert "1 row failed" in summary.sentences[2]
+    assert "With so few recordings the intervals are rough." in summary.sentences[2]
+    assert summary.sentences[2].endswith("Intervals of rows with 2 seeds leave out much of the chance in training.")
+    assert [tile.label for tile in summary.tiles][-1] == "Mean (known)"
+    assert all(0 <= tile.low <= tile.at <= tile.high <= 100 for tile in summary.tiles)
+
+
+def test_rows_that_were_not_run_have_not_failed(run):
+    (found,) = load_runs([run])
+    left = tuple(
+        replace(row, results=(), failures=(), record=row.record.model_copy(update={"results": (), "failure": NOT_RUN}))
+        for row in found.rows[:2]
+    )
+    found = replace(found, rows=(*left, *found.rows[2:]))
+    scores = score_rows(found.rows, np.random.default_rng(0))
+    assert "; 1 row failed, 2 were not run yet." in summarise([found], scores, headline(scores)).sentences[2]
+    assert [failure.name for failure in failures([found]) if failure.kind == "row"] == ["ED-NT"]
+
+
+def test_what_is_nowhere_is_not_compared():
+    rows = [counted_row(name, {"road": [hits] * 12}) for name, hits in (("BL-DC", 50), ("ED-DC", 60))]
+    scores = score_rows(rows, np.random.default_rng(0))
+    summary = summarise([Run(Path(), "", None, tuple(rows))], scores, headline(scores))
+    assert summary.sentences[1] == "Against BL-DC, ED-DC is clearly better on static (known) (+0.100)."
+
+
+def test_only_rows_with_as_many_inputs_are_compared_first():
+    more = counted_row("ED-SL5", {"road": [90] * 12})
+    more = replace(more, record=more.record.model_copy(update={"inputs": 5}))
+    rows = [counted_row("BL-DC", {"road": [50] * 12}), counted_row("ED-DC", {"road": [60] * 12}), more]
+    found = headline(score_rows(rows, np.random.default_rng(0)))
+    assert (found.best.name, found.rival.name, found.compared) == ("ED-DC", "BL-DC", 2)
