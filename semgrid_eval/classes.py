@@ -125,7 +125,7 @@ def class_map() -> NDArray[np.uint8]:
 
 
 def label_ids_from_train_ids() -> NDArray[np.uint8]:
-    """Return the table (256,) from Cityscapes train id to label id; what is no train id becomes 0 (unlabeled)."""
+    """Return the table (256,) from Cityscapes train id to label id; what is not a train id becomes 0 (unlabeled)."""
     table = np.zeros(256, np.uint8)
     for label in CITYSCAPES_LABELS:
         if label.train_id != 255:

@@ -67,7 +67,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def atomic_folder(path: Path) -> Iterator[Path]:
-    """Give a temporary folder beside `path` that becomes `path` (replacing it) when the block ends without error.
+    """Return a temporary folder beside `path` that becomes `path` (replacing it) when the block ends without error.
 
     Raises:
         InputError: the folder cannot be written to.

@@ -116,7 +116,7 @@ def compare(size: BenchmarkSize, found: Mapping[str, str]) -> Comparison:
 
 @cache
 def published_fingerprints(dataset: str) -> frozenset[str]:
-    """Return what is published of a benchmark by the name that its logs carry; empty where it is no benchmark's."""
+    """Return what is published of a benchmark by the name that its logs carry; empty where it is not a benchmark's."""
     for benchmark in map(load_benchmark, BENCHMARKS):
         for name, size in benchmark.sizes.items():
             if benchmark.dataset(name) == dataset:

@@ -209,7 +209,7 @@ def _pictures(log: LogReader, camera: str) -> Generator[Finding, None, set[int]]
         yield _warning(camera_topic(camera, topics.DISPARITY), message)
     unknown = sorted(value for value in label_ids if value > _LAST_LABEL_ID)
     if unknown:
-        message = f"holds {unknown[:5]}, which are no Cityscapes label ids (are they train ids?)"
+        message = f"holds {unknown[:5]}, which are not Cityscapes label ids (are they train ids?)"
         yield _warning(camera_topic(camera, topics.LABEL), message)
     return label_ids
 

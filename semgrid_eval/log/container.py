@@ -70,7 +70,7 @@ class Container:
     """An open MCAP file whose summary was read and checked.
 
     Raises:
-        LogError: the file cannot be read, is no MCAP file, ends early or has no index.
+        LogError: the file cannot be read, is not an MCAP file, ends early or has no index.
     """
 
     def __init__(self, path: Path) -> None:

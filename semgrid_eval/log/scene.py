@@ -58,7 +58,7 @@ class Scene:
             raise ValueError(f"its format version is {given.get('format_version')}; {FORMAT_VERSION} can be read")
         for key in ("name", "split"):
             if given[key] in ("", "..") or PurePath(given[key]).name != given[key]:
-                raise ValueError(f"its {key} {given[key]!r} is no file name")
+                raise ValueError(f"its {key} {given[key]!r} is not a file name")
         return cls(
             name=given["name"],
             dataset=given["dataset"],

@@ -30,7 +30,7 @@ def find_logs(folder: Path) -> list[Path]:
     """
     found = sorted(_walk(folder, {folder.resolve()}))
     if not found:
-        raise InputError("holds no .mcap log" if folder.is_dir() else "is no folder", path=folder)
+        raise InputError("holds no .mcap log" if folder.is_dir() else "is not a folder", path=folder)
     return found
 
 
@@ -71,7 +71,7 @@ def write_log(recording: Recording, path: Path) -> None:
 
 
 def read_recording(path: Path) -> Recording:
-    """Give what a log holds as a recording again; written anew, it makes the same bytes.
+    """Return what a log holds as a recording again; written anew, it makes the same bytes.
 
     Each pass over its moments opens the log and streams from it. Motion after the last moment is left out.
 
@@ -100,7 +100,7 @@ class LogReader:
     """One log, read lazily; closes its file with its block, or by `close`.
 
     Raises:
-        LogError: the file cannot be read, is damaged, was not written to the end, or is no log of this package.
+        LogError: the file cannot be read, is damaged, was not written to the end, or is not a log of this package.
     """
 
     def __init__(self, path: Path) -> None:

@@ -26,7 +26,7 @@ class RepeatNewest:
     """BL-DC where the row translates, BL-NT where it does not: the newest grid of the first sensor, as it is given."""
 
     def __call__(self, batch: WindowBatch, /) -> Tensor:
-        """Give the newest grid as certain scores: (B, C, H, W)."""
+        """Return the newest grid as certain scores: (B, C, H, W)."""
         return one_hot(batch.past[:, 0, -1])
 
 
@@ -37,7 +37,7 @@ class OverlaySensors:
         self._top = top
 
     def __call__(self, batch: WindowBatch, /) -> Tensor:
-        """Give the overlay as certain scores: (B, C, H, W).
+        """Return the overlay as certain scores: (B, C, H, W).
 
         Raises:
             InputError: the row has no sensor of that name.
@@ -56,5 +56,5 @@ class FuseAll:
     """
 
     def __call__(self, batch: WindowBatch, /) -> Tensor:
-        """Give the overlay as certain scores: (B, C, H, W)."""
+        """Return the overlay as certain scores: (B, C, H, W)."""
         return one_hot(overlay(newest_first(batch)))

@@ -129,7 +129,7 @@ def read_history(path: Path) -> list[EpochRecord]:
         with path.open(encoding="utf-8", newline="") as stream:
             return [_record(row) for row in csv.DictReader(stream)]
     except (OSError, ValueError, KeyError, TypeError, csv.Error) as error:
-        raise InputError(f"is no history of a training: {error}", path=path) from error
+        raise InputError(f"is not a history of a training: {error}", path=path) from error
 
 
 def _record(row: dict[str, str]) -> EpochRecord:

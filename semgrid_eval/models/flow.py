@@ -80,7 +80,7 @@ class MoveOn:
         self._cell_m = cell_m
 
     def __call__(self, batch: WindowBatch, /) -> Tensor:
-        """Give BL-Fuse's overlay with what moves moved on, as certain scores: (B, C, H, W)."""
+        """Return BL-Fuse's overlay with what moves moved on, as certain scores: (B, C, H, W)."""
         layers = torch.stack([overlay(grids) for grids in batch.past.flip(2).unbind(dim=2)], dim=1)  # newest first
         if layers.shape[1] < 2:
             return one_hot(layers[:, 0])

@@ -98,7 +98,7 @@ class NetworkPredictor:
         self._dtype = dtype
 
     def __call__(self, batch: WindowBatch, /) -> Tensor:
-        """Give class probabilities: (B, C, H, W) float32."""
+        """Return class probabilities: (B, C, H, W) float32."""
         with torch.inference_mode(), autocast(batch.past.device, self._dtype):
             return self._network(batch.past).float().softmax(dim=1)  # type: ignore[no-any-return]
 

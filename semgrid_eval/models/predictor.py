@@ -88,7 +88,7 @@ def one_hot(classes: Tensor) -> Tensor:
 def _from_file(path: Path, name: str) -> Any:  # noqa: ANN401 - whatever the file defines
     spec = importlib.util.spec_from_file_location(f"semgrid_eval_model_{path.stem}", path)
     if not path.is_file() or spec is None or spec.loader is None:
-        raise InputError("is no Python file; a model is given as path.py:Class", path=path)
+        raise InputError("is not a Python file; a model is given as path.py:Class", path=path)
     _look_beside(path.resolve().parent)
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # dataclasses and pickle look a class's module up by name

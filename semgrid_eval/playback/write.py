@@ -187,7 +187,7 @@ def _listed(names: Sequence[str]) -> str:
 
 def _open_drive(record: RunRecord, scored: _Scored, name: str, logs: Path, stack: ExitStack) -> Drive:
     if not logs.is_dir():
-        raise InputError("is no folder", path=logs)
+        raise InputError("is not a folder", path=logs)
     path = scored.record.windows[scored.windows_of[name][0]].log
     log = stack.enter_context(LogReader(logs / path))
     known = scored_digest(record, scored.record, path)
@@ -243,7 +243,7 @@ class _Track:
     def _layers(
         self, index: int, window: WindowRecord, inputs_ns: Sequence[int]
     ) -> Iterator[tuple[str, NDArray[np.uint8], GridLayer, int]]:
-        """Give topic, values (H, W), their meaning and since when they could be known, of each grid of a window."""
+        """Return topic, values (H, W), their meaning and since when they could be known, of each grid of a window."""
         arrays, row = self._scored.arrays, self._scored.row
         for sensor, past in zip(row.sensors, arrays["inputs"][index], strict=True):
             for back, (values, stamp_ns) in enumerate(zip(past[::-1], inputs_ns[::-1], strict=True)):

@@ -50,13 +50,13 @@ def read_header(data: bytes, path: Path | None = None) -> PngHeader:
         path: where it comes from, for error messages.
 
     Raises:
-        InputError: it is no PNG file, a chunk's checksum is wrong, its end is missing, it has several headers, or its
-            size is out of bounds.
+        InputError: it is not a PNG file, a chunk's checksum is wrong, its end is missing, it has several headers, or
+            its size is out of bounds.
     """
     chunks = list(_chunks(data, path))
     kinds = [chunk.kind for chunk in chunks]
     if kinds[:1] != [b"IHDR"] or chunks[0].end - chunks[0].start != _HEADER.size + _CHUNK_OVERHEAD_BYTES:
-        raise InputError("is no PNG file: it does not begin with a header", path=path)
+        raise InputError("is not a PNG file: it does not begin with a header", path=path)
     if kinds[-1] != b"IEND" or b"IDAT" not in kinds:
         raise InputError("is a damaged PNG file: it ends early", path=path)
     if kinds.count(b"IHDR") > 1:  # decoders may obey another one than the one whose size is checked here
@@ -158,7 +158,7 @@ def _pack(kind: bytes, body: bytes) -> bytes:
 def _chunks(data: bytes, path: Path | None) -> Iterator[_Chunk]:
     """Walk over the chunks up to IEND, holding each one's checksum against its bytes."""
     if not data.startswith(_SIGNATURE):
-        raise InputError("is no PNG file", path=path)
+        raise InputError("is not a PNG file", path=path)
     view = memoryview(data)
     start = len(_SIGNATURE)
     kind = b""

@@ -17,6 +17,7 @@ from semgrid_eval.models.network import NetworkConfig
 from semgrid_eval.models.predictor import installed_models
 from semgrid_eval.models.training import TrainingConfig
 from semgrid_eval.scores.evaluate import MaskMode
+from semgrid_eval.scores.results import RowFacts
 from semgrid_eval.windows.plan import WindowConfig
 
 TRAINED_MODEL = "ed"
@@ -107,6 +108,21 @@ class Row(Config):
         if self.trained:
             return "ED"
         return "BL" if self.model in BASELINES else self.name.partition("-")[0]
+
+    @property
+    def facts(self) -> RowFacts:
+        """What the row is, whatever it is called."""
+        return RowFacts(
+            model=self.model,
+            family=self.kind,
+            learns=self.trained or self.model == "table",
+            baseline=self.model in BASELINES,
+            inputs=self.window.inputs,
+            step_frames=self.scored_window.step_frames,
+            horizon_steps=self.scored_window.horizon_steps,
+            sensors=self.sensors,
+            translate=self.translate,
+        )
 
     @property
     def label(self) -> str:

@@ -122,7 +122,7 @@ def run_matrix(
 
 
 def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[WindowSet, str | None]]:
-    """Give the windows of rows that have some, and the camera that they show."""
+    """Return the windows of rows that have some, and the camera that they show."""
     for row in rows:
         with suppress(SemgridError, torch.OutOfMemoryError):  # its units will tell
             yield worker.scored_windows(row)[0], row.grid.camera
@@ -170,7 +170,7 @@ class _Clock:
 def _unit_work(
     matrix: Matrix, logs: Path, out: Path, options: RunOptions, worker: Worker, stage: Stage
 ) -> Iterator[tuple[Callable[[Unit], Outcome], Progress]]:
-    """Give the function that works off one unit, here or wherever the executor sends it, and who is told of each."""
+    """Return the function that works off one unit, here or wherever the executor sends it, and who is told of each."""
     if options.executor.parallel == 1:
         yield partial(_attempt, worker), silent  # the stages of a unit show themselves
         return
@@ -218,7 +218,7 @@ def _worker_at(place: _Place) -> Worker:
 
 
 def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:
-    """Give the rows that are asked for by names or patterns like `BL-*`, all of them where nothing is asked for.
+    """Return the rows that are asked for by names or patterns like `BL-*`, all of them where nothing is asked for.
 
     Raises:
         ConfigError: a name or pattern fits no row.
@@ -237,7 +237,7 @@ def _is_asked(row: Row, pattern: str) -> bool:
 
 
 def wanted_keys(matrix: Matrix, only: Sequence[str]) -> set[str]:
-    """Give the keys of the units of the rows that are asked for."""
+    """Return the keys of the units of the rows that are asked for."""
     return {key for row in wanted_rows(matrix, only) for key, _ in units_of(row, matrix.seed)}
 
 
@@ -264,7 +264,7 @@ def _attempt(worker: Worker, unit: Unit) -> Outcome:
 
 
 def units_of(row: Row, first_seed: int) -> Iterator[tuple[str, Unit]]:
-    """Give the units of a row with the keys by which rows that mean the same share them."""
+    """Return the units of a row with the keys by which rows that mean the same share them."""
     seeds = range(first_seed, first_seed + row.repeats) if row.trained else [None]
     for seed in seeds:
         yield digest_value([identity(row), seed]), Unit(row, seed)
@@ -307,6 +307,7 @@ def _row_record(row: Row, first_seed: int, outcomes: dict[str, Outcome]) -> resu
     failures = [outcome.failure for outcome in done if outcome.failure is not None]
     found = [outcome.result_id for outcome in done if outcome.result_id is not None]
     return results.RowRecord(
+        facts=row.facts,
         name=row.name,
         experiment=row.group,
         model=row.kind,

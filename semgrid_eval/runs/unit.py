@@ -116,6 +116,9 @@ class Worker:
         record = results.ResultRecord(
             format_version=results.FORMAT_VERSION,
             id=job.result_id,
+            facts=row.facts,
+            targets=target_key(row, job.scored),
+            lead_s=round(float(job.scored.lead_s[:, -1].median()), 6),
             config=job.config,
             log_digests=tuple(sorted(set(job.scored.data.digests))),
             seed=seed,
@@ -237,6 +240,15 @@ class Training:
     seed: int
     windows: WindowSet
     watched: WindowSet | None
+
+
+def target_key(row: Row, scored: WindowSet) -> str:
+    """Digest what rows must share to be subtracted: target frames of which logs, their grids, mask mode and split."""
+    frames = scored.target_frames.cpu().numpy()
+    owners, places = scored.data.locate(frames)
+    digests = [scored.data.digests[owner] for owner in owners]
+    targets = sorted(zip(digests, scored.data.stamps_ns[frames].tolist(), places.tolist(), strict=True))
+    return digest_value([targets, grid_digest(row.grid), row.mask_mode, row.validation_split, list(CLASS_NAMES)])
 
 
 def identity(row: Row) -> dict[str, object]:

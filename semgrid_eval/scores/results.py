@@ -65,11 +65,46 @@ class WindowRecord(Config):
         return re.sub(r"#\d+$", "", self.recording)
 
 
+class RowFacts(Config):
+    """What a row is, whatever it is called: differences, pairs, curves and examples are formed by this alone.
+
+    Args:
+        model: as the matrix names it: `ed`, `fuse`, `mine.py:Mine`.
+        family: of models, which figures draw alike: `ED`, `BL`, or that of a model of one's own.
+        learns: whether it was fitted to training windows, by counts or by gradient.
+        baseline: whether other rows are measured against it.
+        inputs: grids of the past, by sensor.
+        step_frames: frames between inputs.
+        horizon_steps: steps from the newest input to the target.
+        sensors: names of the inputs' sensors.
+        translate: whether inputs are moved into the target's place.
+    """
+
+    model: str
+    family: str
+    learns: bool
+    baseline: bool
+    inputs: int
+    step_frames: int
+    horizon_steps: int
+    sensors: tuple[str, ...]
+    translate: bool
+
+
 class ResultRecord(Config):
-    """One scored predictor with one seed."""
+    """One scored predictor with one seed.
+
+    Args:
+        targets: digest of target windows, of what makes their grids, mask mode and split. Results are subtracted from
+            each other only where it is equal.
+        lead_s: median time from the newest input to the target.
+    """
 
     format_version: int
     id: str
+    facts: RowFacts
+    targets: str
+    lead_s: float
     config: dict[str, object]
     log_digests: tuple[str, ...]
     seed: int | None  # None: the predictor does not depend on chance
@@ -84,6 +119,7 @@ class ResultRecord(Config):
 class RowRecord(Config):
     """One row of the matrix; a failed row has a reason instead of results."""
 
+    facts: RowFacts
     name: str  # unique in the run, e.g. "ED-DC"
     experiment: str  # "DC", "NT", "Sp2", "PH3", ...
     model: str  # "ED", "BL", ...

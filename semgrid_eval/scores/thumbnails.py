@@ -137,7 +137,7 @@ def _cut(arrays: Mapping[str, NDArray[Any]], name: str, ends_name: str, path: Pa
 def _checked(
     arrays: Mapping[str, NDArray[Any]], name: str, shape: tuple[int, ...], kind: type[np.generic], path: Path
 ) -> NDArray[Any]:
-    """Give an array that has the shape, -1 standing for any length, and the type that it should, and is finite."""
+    """Return an array that has the shape, -1 standing for any length, and the type that it should, and is finite."""
     values = arrays[name]
     fits = len(values.shape) == len(shape) and all(
         wanted in (-1, found) for wanted, found in zip(shape, values.shape, strict=True)

@@ -38,7 +38,7 @@ class SegmentationNetwork:
 
     Raises:
         MissingExtraError: ONNX Runtime is not installed.
-        InputError: the file is no ONNX model, or does not turn one image into classes as the config says.
+        InputError: the file is not an ONNX model, or does not turn one image into classes as the config says.
     """
 
     def __init__(self, path: Path, config: SegmentationConfig) -> None:
@@ -166,14 +166,14 @@ def _open(path: Path) -> Any:  # noqa: ANN401 - ONNX Runtime has no types
     except ImportError:
         raise MissingExtraError("segment", "onnxruntime") from None
     if not path.is_file():
-        raise InputError("is no file", path=path, field="model")
+        raise InputError("is not a file", path=path, field="model")
     settings = onnxruntime.SessionOptions()
     settings.log_severity_level = 4  # what is wrong comes as an exception, too
     settings.intra_op_num_threads = _threads()
     try:
         return onnxruntime.InferenceSession(path, settings, providers=["CPUExecutionProvider"])
     except Exception as error:  # ONNX Runtime's errors have no base of their own
-        raise InputError(f"is no model that can be used: {_one_line(error)}", path=path) from error
+        raise InputError(f"is not a model that can be used: {_one_line(error)}", path=path) from error
 
 
 def _threads() -> int:

@@ -109,7 +109,7 @@ class _Recipe:
         return digest_value(self.record(_digest_of(path)))
 
     def recording(self, path: Path) -> Recording:
-        """Give the new recording of a log."""
+        """Return the new recording of a log."""
         record = self.record(_digest_of(path))
         recording = relabelled(read_recording(path), _network(self.model, self.model_digest, self.config).label)
         note = json.dumps(record, indent=2, sort_keys=True).encode()

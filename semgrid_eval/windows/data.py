@@ -49,7 +49,7 @@ class GridData:
     actors: tuple[NDArray[np.uint8] | None, ...] = ()
 
     def to(self, device: torch.device) -> "GridData":
-        """Give the same data with its grids on another device."""
+        """Return the same data with its grids on another device."""
         return replace(self, grids=self.grids.to(device))
 
     @property
@@ -122,7 +122,7 @@ class WindowSet:
         return len(self.sensors) * self.inputs.shape[1]
 
     def to(self, device: torch.device) -> "WindowSet":
-        """Give the same windows with all tensors on another device."""
+        """Return the same windows with all tensors on another device."""
         tensors = ("sensor_rows", "inputs", "target_frames", "shift_cells", "lead_s")
         return replace(self, data=self.data.to(device), **{name: getattr(self, name).to(device) for name in tensors})
 
@@ -270,7 +270,7 @@ def covered_without_truth(aligned: Tensor, target: Tensor) -> Tensor:
 
 
 def window_arrays(windows: WindowSet, *, batch: int = 64) -> dict[str, NDArray[np.uint8] | NDArray[np.bool_]]:
-    """Give what a run keeps: aligned inputs (N, S, T, H, W), target, mask and, with the truth, actors (N, H, W)."""
+    """Return what a run keeps: aligned inputs (N, S, T, H, W), target, mask and, with the truth, actors (N, H, W)."""
     aligned = replace(windows, translate=True)
     parts = [(part.past.cpu(), part.target.cpu(), part.mask.cpu()) for part in aligned.batches(batch)]
     inputs, target, mask = (torch.cat(column).numpy() for column in zip(*parts, strict=True))

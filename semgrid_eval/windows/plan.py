@@ -57,7 +57,7 @@ class WindowPlan:
 
 
 def training_windows(frame_counts: Sequence[int], config: WindowConfig) -> WindowPlan:
-    """Give every window of every recording: offsets o with inputs o, o+s, ..., o+(n-1)s and target o+(n-1+h)s.
+    """Return every window of every recording: offsets o with inputs o, o+s, ..., o+(n-1)s and target o+(n-1+h)s.
 
     Raises:
         InputError: no recording is long enough.
@@ -67,7 +67,7 @@ def training_windows(frame_counts: Sequence[int], config: WindowConfig) -> Windo
 
 
 def validation_windows(frame_counts: Sequence[int], config: WindowConfig) -> WindowPlan:
-    """Give one window a recording, its target at `target_frame`, which rows of other shapes share (reading 3).
+    """Return one window a recording, its target at `target_frame`, which rows of other shapes share (reading 3).
 
     Raises:
         InputError: no recording is long enough.

@@ -101,7 +101,7 @@ def test_labels_of_the_other_kind_are_one_line_without_traceback(tree, tmp_path,
 def test_wrong_folder_is_one_line_without_traceback(tmp_path, capsys):
     assert run("convert", "cityscapes", tmp_path, tmp_path / "logs") == 1
     said = capsys.readouterr().err
-    assert said == f"Error: {tmp_path}/leftImg8bit_sequence: is no folder; a Cityscapes sequence tree has one\n"
+    assert said == f"Error: {tmp_path}/leftImg8bit_sequence: is not a folder; a Cityscapes sequence tree has one\n"
 
 
 def test_help_works_though_the_synthetic_extra_is_missing(monkeypatch, capsys):

@@ -192,4 +192,4 @@ def test_log_without_labels_is_not_said_to_hold_train_ids(tmp_path):
 def test_values_that_are_no_labels_are_a_warning(tmp_path):
     train_ids = encode_gray(np.full((32, 64), 255, np.uint8))
     found = findings(tmp_path, lambda number, moment: with_frame(moment, label_png=train_ids))
-    assert "[255], which are no Cityscapes label ids" in found["/camera/front/label"][1]
+    assert "[255], which are not Cityscapes label ids" in found["/camera/front/label"][1]

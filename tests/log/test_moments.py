@@ -96,5 +96,5 @@ def test_errors_of_the_consumer_are_not_taken_for_damage(tmp_path):
 @pytest.mark.parametrize("changed", [{"name": "../street"}, {"split": ".."}, {"name": ""}])
 def test_log_whose_name_leads_elsewhere_is_refused(tmp_path, changed):
     write_log(replace(driving(), **changed), tmp_path / "log.mcap")
-    with pytest.raises(LogError, match="is no file name"):
+    with pytest.raises(LogError, match="is not a file name"):
         LogReader(tmp_path / "log.mcap")

@@ -179,7 +179,7 @@ def test_logs_are_found_at_any_depth_sorted_without_unfinished_ones(tmp_path):
 def test_folder_without_logs_is_an_error(tmp_path):
     with pytest.raises(InputError, match=r"holds no \.mcap log"):
         find_logs(tmp_path)
-    with pytest.raises(InputError, match="is no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         find_logs(tmp_path / "missing")
 
 

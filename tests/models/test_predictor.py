@@ -74,7 +74,7 @@ def test_model_that_cannot_be_made_is_named(own_model, name, message):
 def test_file_that_is_missing_or_no_python_is_named(tmp_path):
     broken = tmp_path / "broken.py"
     broken.write_text("def half(")
-    with pytest.raises(InputError, match=r"none\.py: is no Python file"):
+    with pytest.raises(InputError, match=r"none\.py: is not a Python file"):
         load_predictor(f"{tmp_path / 'none.py'}:Model")
     with pytest.raises(InputError, match=r"broken\.py: raised SyntaxError"):
         load_predictor(f"{broken}:Model")

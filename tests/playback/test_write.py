@@ -218,7 +218,7 @@ def test_results_without_times_of_inputs_take_them_from_the_logs(run, logs, tmp_
             {"recording": "toy9"},
             "row BL-DC: there is no scored recording 'toy9', only toy0#1, toy0#2, toy1#1, toy1#2",
         ),
-        ("BL-DC", {"logs": "absent"}, "absent: is no folder"),
+        ("BL-DC", {"logs": "absent"}, "absent: is not a folder"),
         ("BL-DC", {"logs": "empty"}, "empty/val/toy0.mcap: cannot be read: No such file or directory"),
         ("BL-DC", {"logs": "other"}, "other/val/toy0.mcap: has digest"),
     ],

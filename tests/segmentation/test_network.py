@@ -126,13 +126,13 @@ def test_one_of_several_outputs_is_chosen_by_name(path):
 
 def test_file_that_is_no_model_is_one_line(path):
     path.write_bytes(b"no\nmodel")
-    with pytest.raises(InputError, match=r"network\.onnx: is no model that can be used: .*Protobuf") as caught:
+    with pytest.raises(InputError, match=r"network\.onnx: is not a model that can be used: .*Protobuf") as caught:
         open_network(path)
     assert "\n" not in str(caught.value)
 
 
 def test_missing_file_is_named(path):
-    with pytest.raises(InputError, match=r"network\.onnx: model: is no file"):
+    with pytest.raises(InputError, match=r"network\.onnx: model: is not a file"):
         open_network(path)
 
 
@@ -209,7 +209,7 @@ def test_open_number_of_classes_is_checked_when_it_is_known(path):
 
 def test_ids_outside_of_the_set_are_refused(path):
     network = open_network(colour_network(path, classes=34, colours={7: (1, 0, 0), 26: (0, 0, 1)}, ids=np.int64))
-    with pytest.raises(InputError, match=r"network\.onnx: answer: gives the id 26, which is no train id"):
+    with pytest.raises(InputError, match=r"network\.onnx: answer: gives the id 26, which is not a train id"):
         network.label(painted(["rb"]))
 
 

@@ -155,7 +155,7 @@ def test_single_logs_can_be_given(logs, model):
 
 def test_model_that_cannot_be_used_is_one_error(logs, model):
     model.write_bytes(b"none")
-    with pytest.raises(InputError, match=r"network\.onnx: is no model that can be used"):
+    with pytest.raises(InputError, match=r"network\.onnx: is not a model that can be used"):
         segment([logs], model)
 
 
@@ -163,7 +163,7 @@ def test_failure_of_the_network_is_a_failure_of_the_log(logs, model):
     colour_network(model, classes=34, colours={7: (1, 0, 0), 26: (0, 0, 1)}, ids=np.int64)
     summary = segment([logs], model)
     assert list(summary.failed) == ["val/a", "val/b"]
-    assert summary.failed["val/a"].endswith("network.onnx: answer: gives the id 26, which is no train id")
+    assert summary.failed["val/a"].endswith("network.onnx: answer: gives the id 26, which is not a train id")
 
 
 @pytest.mark.parametrize("out", ["logs", ".", "logs/labelled"])

@@ -107,6 +107,9 @@ def counted_row(
     record = results.ResultRecord(
         format_version=results.FORMAT_VERSION,
         id=digest_value(name),
+        facts=facts(name.split("-", 1)[0]),
+        targets="targets",
+        lead_s=0.294118,
         config={},
         log_digests=(),
         seed=None,
@@ -119,6 +122,7 @@ def counted_row(
     )
     model, experiment = name.split("-", 1)
     row = results.RowRecord(
+        facts=facts(model),
         name=name,
         experiment=experiment,
         model=model,
@@ -131,6 +135,23 @@ def counted_row(
     )
     regions = {region: _hit_counts(each, cells) for region, each in (near or {}).items()}
     return Row(name, row, (Result(record, counts, regions, None, Path()),), (), Path())
+
+
+def facts(
+    family: str, sensors: tuple[str, ...] = ("front",), horizon_steps: int = 1, *, translate: bool = True
+) -> results.RowFacts:
+    """What a row of a family is: `BL` are baselines, all others learn."""
+    return results.RowFacts(
+        model=family.lower(),
+        family=family,
+        learns=family != "BL",
+        baseline=family == "BL",
+        inputs=2,
+        step_frames=5,
+        horizon_steps=horizon_steps,
+        sensors=sensors,
+        translate=translate,
+    )
 
 
 def _hit_counts(hits: dict[str, list[int]], cells: int) -> NDArray[np.int32]:
@@ -172,6 +193,7 @@ class _Maker:
             results.write_arrays(results.windows_file(self.run, windows_id), arrays)
             ids = tuple(self._result(row, seed, inputs, windows_id) for seed in range(max(1, row.seeds)))
         return results.RowRecord(
+            facts=facts(row.model, row.sensors, row.horizon_steps, translate=row.translate),
             name=row.name,
             experiment=row.experiment,
             model=row.model,
@@ -217,6 +239,9 @@ class _Maker:
         record = results.ResultRecord(
             format_version=results.FORMAT_VERSION,
             id=result_id,
+            facts=facts(row.model, row.sensors, row.horizon_steps, translate=row.translate),
+            targets=digest_value(self.names),
+            lead_s=0.294118 * row.horizon_steps,
             config=config,
             log_digests=tuple(digest_value(n) for n in self.names),
             seed=seed if trained else None,

@@ -68,11 +68,11 @@ class RowScores:
         return dict(zip(COLUMNS, mean_finite(self.by_seed, axis=0).tolist(), strict=True))
 
     def estimate(self, column: str) -> Estimate:
-        """Give a column's mean over seeds with its interval."""
+        """Return a column's mean over seeds with its interval."""
         return _estimate(self.mean[column], self.draws[:, COLUMNS.index(column)])
 
     def minus(self, other: "RowScores", column: str) -> Estimate:
-        """Give the paired difference to another row."""
+        """Return the paired difference to another row."""
         return weighted_sum([(1, self), (-1, other)], column)
 
 

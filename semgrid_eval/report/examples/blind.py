@@ -44,7 +44,7 @@ def blind_cells(drive: Drive, grid: GridConfig, sensors: Sequence[str], window: 
 
 
 def _cell_centres_odom(spec: GridSpec, pose: NDArray[np.float64], yaw_rad: float) -> NDArray[np.float64]:
-    """Give the centres of the cells of a grid around a pose, in the odom frame: (H, W, 2)."""
+    """Return the centres of the cells of a grid around a pose, in the odom frame: (H, W, 2)."""
     forward_m, left_m = np.meshgrid(*spec.centres_m(), indexing="ij")
     cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
     x_m, y_m = cosine * forward_m - sine * left_m, sine * forward_m + cosine * left_m

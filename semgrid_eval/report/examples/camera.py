@@ -40,7 +40,7 @@ class View:
     sensors: tuple[str, ...]
 
     def photos(self, stamp_ns: int | None, moment: str) -> Iterator[Picture]:
-        """Give the camera image and the segmentation of a time, as far as they were kept."""
+        """Return the camera image and the segmentation of a time, as far as they were kept."""
         if self.kept is None or self.grid is None or stamp_ns is None or stamp_ns not in self.kept.frames:
             return
         files = self.kept.frames[stamp_ns]

@@ -94,7 +94,7 @@ class Shown:
         self._answers = {name: self._of(row, read_predictions(row.shown.folder)) for name, row in answering.items()}
 
     def film(self, i: int, view: View) -> Iterator[Column]:
-        """Give the inputs and the target; where the contest is about horizons, each row's newest input and answer."""
+        """Return the inputs and the target; where the contest is about horizons, each row's newest input and answer."""
         yield from self._horizons(i, view) if self.contest.baselines else self._inputs(i, view)
         seen = self._seen[self.contest.model.name][i]
         target = grid_picture("Target", "Target grid with mask M in white", seen["target"], seen["mask"] > 0)
@@ -102,7 +102,7 @@ class Shown:
         yield Column("Target", "to be predicted", (*photos, target))
 
     def answers(self, i: int) -> Iterator[Column]:
-        """Give the prediction, those of rivals, who is right, and certainty."""
+        """Return the prediction, those of rivals, who is right, and certainty."""
         if self.contest.baselines:
             return
         model = self.contest.model
@@ -132,7 +132,7 @@ class Shown:
             yield Column(title, view.before(stamp_ns), (*view.photos(stamp_ns, title), *grids))
 
     def _horizons(self, i: int, view: View) -> Iterator[Column]:
-        """Give a column for each horizon, the farthest first: what was known then, and what was made of it."""
+        """Return a column for each horizon, the farthest first: what was known then, and what was made of it."""
         contest = self.contest
         for row, baseline in reversed(list(zip((contest.model, *contest.rivals), contest.baselines, strict=True))):
             if i not in self._seen[row.name]:

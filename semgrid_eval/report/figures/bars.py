@@ -149,7 +149,7 @@ def _paper_value(entry: RowScores, category: str) -> float:
 
 
 def _highest(scores: Scores, category: str) -> float:
-    """Give the highest value of a panel, which its height follows."""
+    """Return the highest value of a panel, which its height follows."""
     estimates = [entry.estimate(category) for entry in scores.values()]
     papers = [_paper_value(entry, category) for entry in scores.values()]
     return float(np.nanmax([0.0, *papers, *(v for e in estimates for v in (e.value, e.high))]))

@@ -90,7 +90,7 @@ def paper_note(scores: Scores) -> str:
 
 
 def line_style(index: int) -> dict[str, Any]:
-    """Give the colour and stroke of one of many lines."""
+    """Return the colour and stroke of one of many lines."""
     colours = len(PALETTE)
     return {"color": PALETTE[index % colours], "linestyle": STROKES[index // colours % len(STROKES)]}
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 
 def row_command(command: str, row: str, matrix: str) -> str:
-    """Give the command line that makes one row: the run's own, narrowed to it, or one that reads the matrix file."""
+    """Return the command line that makes one row: the run's own, narrowed to it, or one that reads the matrix file."""
     words = _words(command) or ["semgrid-eval", "run", matrix, "--logs", "LOGS", "--out", "RUN"]
     kept, skip = [], False
     for word in words:
@@ -16,7 +16,7 @@ def row_command(command: str, row: str, matrix: str) -> str:
 
 
 def play_command(command: str, row: str, recording: str) -> str:
-    """Give the command line that plays a recording of a row, with the folders that the run's own names."""
+    """Return the command line that plays a recording of a row, with the folders that the run's own names."""
     spread = [part for word in _words(command) for part in (word.split("=", 1) if word.startswith("--") else [word])]
     found = {name: value for name, value in pairwise(spread) if name.startswith("--")}
     logs = found.get("--validation-logs", found.get("--logs", "LOGS"))

@@ -144,7 +144,7 @@ def _pair(found: Headline | None) -> tuple[Row | None, Row | None]:
 def _kind(best: Row, rival: Row) -> str:
     if best.is_baseline == rival.is_baseline:
         return "the runner-up"
-    return "the best baseline" if rival.is_baseline else "the best model that is no baseline"
+    return "the best baseline" if rival.is_baseline else "the best model that is not a baseline"
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -196,7 +196,7 @@ def _check_replaceable(out: Path) -> None:
         return
     is_report = (out / exports.RECORD).is_file() and (out / PAGE).is_file()
     if not out.is_dir() or (any(out.iterdir()) and not is_report):
-        raise InputError("exists and is no report; name another folder", path=out, field="out")
+        raise InputError("exists and is not a report; name another folder", path=out, field="out")
 
 
 def _source(name: str) -> Markup:

@@ -55,7 +55,7 @@ class Result:
             return None
 
     def of_windows(self, used: NDArray[np.bool_], counts: NDArray[np.int32]) -> "Result":
-        """Give the result of the windows marked in `used` (N,) alone, with their part of other counts (N, C, C)."""
+        """Return the result of the windows marked in `used` (N,) alone, with their part of other counts (N, C, C)."""
         windows = tuple(window for window, kept in zip(self.record.windows, used, strict=True) if kept)
         return replace(self, counts=counts[used], record=self.record.model_copy(update={"windows": windows}))
 

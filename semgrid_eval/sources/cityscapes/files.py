@@ -87,7 +87,7 @@ def read_stamp(path: Path) -> int:
     text = read_file(path).strip()
     if not text.isdigit() or len(text) > 19 or int(text) > _LAST_STAMP_NS:
         shown = text[:40].decode(errors="replace")
-        raise InputError(f"{shown!r} is no time stamp in integer nanoseconds", path=path)
+        raise InputError(f"{shown!r} is not a time stamp in integer nanoseconds", path=path)
     return int(text)
 
 
@@ -122,7 +122,7 @@ def _label_ids(train_ids: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
     known = [label.train_id for label in CITYSCAPES_LABELS]  # 255, which stands for none, among them
     strange = np.setdiff1d(train_ids, known)
     if len(strange):
-        raise InputError(f"holds {strange[0]}, which is no train id; are these label ids?", path=path)
+        raise InputError(f"holds {strange[0]}, which is not a train id; are these label ids?", path=path)
     return label_ids_from_train_ids()[train_ids]
 
 
@@ -132,7 +132,7 @@ def _read_object(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise InputError(f"is not valid JSON: {error}", path=path) from error
     if not isinstance(content, dict):
-        raise InputError("is no JSON object", path=path)
+        raise InputError("is not a JSON object", path=path)
     return content
 
 
@@ -145,7 +145,7 @@ def _number(content: dict[str, Any], path: Path, *place: str) -> float:
             raise InputError("is missing", path=path, field=field)
         value = value[key]
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{str(value)[:40]!r} is no number", path=path, field=field)
+        raise InputError(f"{str(value)[:40]!r} is not a number", path=path, field=field)
     try:
         number = float(value)
     except OverflowError:

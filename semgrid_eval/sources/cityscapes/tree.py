@@ -57,12 +57,12 @@ def find_sequences(
             ids, or the camera cannot be called so.
     """
     if not _CAMERA_NAME.fullmatch(camera_name):
-        raise InputError(f"{camera_name!r} is no name of letters, digits, _ and -", field="camera name")
+        raise InputError(f"{camera_name!r} is not a name of letters, digits, _ and -", field="camera name")
     root = src / _IMAGES
     if not root.is_dir():
-        raise InputError("is no folder; a Cityscapes sequence tree has one", path=root)
+        raise InputError("is not a folder; a Cityscapes sequence tree has one", path=root)
     if labels is not None and not labels.is_dir():
-        raise InputError("is no folder of label images", path=labels)
+        raise InputError("is not a folder of label images", path=labels)
     pattern = "*/[!.]*_leftImg8bit.png"
     images = [image for split in _splits(root, splits) for image in sorted((root / split).glob(pattern))]
     runs = list(_runs(images))
@@ -80,7 +80,7 @@ def _splits(root: Path, wanted: Collection[str] | None) -> list[str]:
     there = sorted(path.name for path in root.iterdir() if path.is_dir())
     for split in wanted or ():
         if split not in there:
-            raise InputError(f"is no split of this tree; it has: {', '.join(there)}", path=root, field=split)
+            raise InputError(f"is not a split of this tree; it has: {', '.join(there)}", path=root, field=split)
     return there if not wanted else sorted(set(wanted))
 
 

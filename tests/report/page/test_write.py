@@ -166,7 +166,7 @@ assert 'torch' not in sys.modules and 'semgrid_eval.runs' not in sys.modules"""
 
 def test_a_folder_that_is_no_report_is_left_alone(run, tmp_path):
     (tmp_path / "thesis.tex").write_text("precious")
-    with pytest.raises(InputError, match="no report"):
+    with pytest.raises(InputError, match="not a report"):
         write_report(run, tmp_path)
     assert (tmp_path / "thesis.tex").read_text() == "precious"
 

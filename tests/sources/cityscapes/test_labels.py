@@ -52,7 +52,7 @@ def test_train_ids_become_label_ids(tree, tmp_path):
 def test_label_ids_taken_for_train_ids_are_noticed(tree, tmp_path):
     (name,) = tree.write([0])
     put(tmp_path / "labels" / f"{name}.png", encode_gray(np.full((32, 64), 26, np.uint8)))
-    with pytest.raises(InputError, match=rf"{name}\.png: holds 26, which is no train id; are these label ids\?"):
+    with pytest.raises(InputError, match=rf"{name}\.png: holds 26, which is not a train id; are these label ids\?"):
         frames(only(tree, labels=tmp_path / "labels", train_ids=True))
 
 

@@ -240,8 +240,8 @@ def test_text_that_is_no_time_stamp_is_named(tree, text):
         (lambda value: value.pop("extrinsic"), "extrinsic.baseline: is missing"),
         (lambda value: value.update(extrinsic=[1]), "extrinsic.baseline: is missing"),
         (lambda value: value["extrinsic"].update(pitch=float("nan")), "extrinsic.pitch: nan is not a finite number"),
-        (lambda value: value["extrinsic"].update(z="high"), "extrinsic.z: 'high' is no number"),
-        (lambda value: value["intrinsic"].update(v0=True), "intrinsic.v0: 'True' is no number"),
+        (lambda value: value["extrinsic"].update(z="high"), "extrinsic.z: 'high' is not a number"),
+        (lambda value: value["intrinsic"].update(v0=True), "intrinsic.v0: 'True' is not a number"),
         (lambda value: value["intrinsic"].update(fx=-1), "intrinsic.fx: -1.0 is not positive"),
         (lambda value: value["extrinsic"].update(baseline=0), "extrinsic.baseline: 0.0 is not positive"),
     ],
@@ -258,7 +258,7 @@ def test_fault_in_a_camera_file_names_file_and_field(tree, change, expected):
         (lambda value: value.pop("speed"), "speed: is missing"),
         (lambda value: value.update(yawRate=float("inf")), "yawRate: inf is not a finite number"),
         (lambda value: value.update(gpsLatitude=float("nan")), "gpsLatitude: nan is not a finite number"),
-        (lambda value: value.update(speed=None), "speed: 'None' is no number"),
+        (lambda value: value.update(speed=None), "speed: 'None' is not a number"),
     ],
 )
 def test_fault_in_a_vehicle_file_names_file_and_field(tree, change, expected):
@@ -308,15 +308,15 @@ def test_damaged_picture_is_named(tree):
 
 
 def test_tree_without_sequences_split_or_labels_is_refused(tree, tmp_path):
-    with pytest.raises(InputError, match=r"src/leftImg8bit_sequence: is no folder"):
+    with pytest.raises(InputError, match=r"src/leftImg8bit_sequence: is not a folder"):
         find_sequences(tree.root)
     (tree.root / "leftImg8bit_sequence" / "val").mkdir(parents=True)
     with pytest.raises(InputError, match="holds no <split>/<city>/"):
         find_sequences(tree.root)
     tree.write([0])
-    with pytest.raises(InputError, match="train: is no split of this tree; it has: val"):
+    with pytest.raises(InputError, match="train: is not a split of this tree; it has: val"):
         find_sequences(tree.root, splits=["train"])
-    with pytest.raises(InputError, match="labels: is no folder of label images"):
+    with pytest.raises(InputError, match="labels: is not a folder of label images"):
         find_sequences(tree.root, labels=tmp_path / "labels")
-    with pytest.raises(InputError, match="camera name: 'a/b' is no name"):
+    with pytest.raises(InputError, match="camera name: 'a/b' is not a name"):
         find_sequences(tree.root, camera_name="a/b")
