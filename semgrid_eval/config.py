@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Hashable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,30 +21,60 @@ class Config(BaseModel):
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """YAML 1.2's plain values (`off` is a word, `1e-4` a number) and no aliases.
+    """The plain values of YAML 1.2's core schema (`off` is a word, `1e-4` a number), and nothing ambiguous.
 
-    An alias can make a short file expand beyond all memory.
+    There are no tags, and no aliases, since one can make a short file expand beyond all memory. Keys are words, each
+    once in a mapping. A whole number that begins with 0 is refused: YAML 1.1 reads `010` as 8, YAML 1.2 as 10.
     """
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            raise yaml.YAMLError("an alias (*name) is not allowed here")
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        if isinstance(event, yaml.AliasEvent):
+            raise _at(event, "an alias (*name) is not allowed here")
+        if event.tag is not None:
+            raise _at(event, f"a tag ({event.tag}) is not allowed here")
         return super().compose_node(parent, index)
 
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        seen: dict[str, int] = {}
+        for key, _ in node.value:
+            if key.tag != _tag("str"):
+                shown = repr(key.value) if isinstance(key, yaml.ScalarNode) else "here"
+                raise _at(key, f"the key {shown} is not a word; put it in quotes")
+            if key.value in seen:
+                raise _at(key, f"the key {key.value!r} stands in line {seen[key.value]} already")
+            seen[key.value] = _line(key)
+        return super().construct_mapping(node, deep)
 
-_YAML_1_1_ONLY = ("tag:yaml.org,2002:bool", "tag:yaml.org,2002:float", "tag:yaml.org,2002:timestamp")
-_StrictLoader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers if tag not in _YAML_1_1_ONLY]
-    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
-_StrictLoader.add_implicit_resolver(
-    "tag:yaml.org,2002:bool", re.compile(r"^(true|True|TRUE|false|False|FALSE)$"), "tTfF"
-)
-_StrictLoader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$"),
-    "-+.0123456789",
-)
+    def construct_int(self, node: yaml.ScalarNode) -> int:
+        """Read a whole number: decimal, `0o17` or `0x1f`."""
+        if re.match(r"[-+]?0[0-9]", node.value):
+            raise _at(node, f"{node.value} is ambiguous: write it without the leading 0, or in quotes")
+        return int(node.value, 0)
+
+
+def _tag(name: str) -> str:
+    return f"tag:yaml.org,2002:{name}"
+
+
+def _line(place: yaml.Node | yaml.Event) -> int:
+    assert place.start_mark is not None, "what is read from a file stands in a line"
+    return place.start_mark.line + 1
+
+
+def _at(place: yaml.Node | yaml.Event, message: str) -> yaml.YAMLError:
+    return yaml.YAMLError(f"line {_line(place)}: {message}")
+
+
+_StrictLoader.yaml_implicit_resolvers = {}
+for _name, _pattern, _first in (
+    ("bool", r"true|True|TRUE|false|False|FALSE", "tTfF"),
+    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", "-+0123456789"),
+    ("float", r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?", "-+.0123456789"),
+    ("null", r"null|Null|NULL|~|", ["n", "N", "~", ""]),
+):
+    _StrictLoader.add_implicit_resolver(_tag(_name), re.compile(f"^({_pattern})$"), _first)
+_StrictLoader.add_constructor(_tag("int"), _StrictLoader.construct_int)
 
 C = TypeVar("C", bound=BaseModel)
 
@@ -76,7 +107,10 @@ def load_yaml(path: Path) -> Any:  # noqa: ANN401 - anything that YAML can hold
         return yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror or error}", path=path) from error
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+    except yaml.MarkedYAMLError as error:
+        place = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
+        raise ConfigError(f"is not valid YAML: {place}{error.problem}", path=path) from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: not UTF-8, or a number of 5,000 digits
         raise ConfigError(f"is not valid YAML: {error}", path=path) from error
 
 

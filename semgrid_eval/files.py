@@ -1,6 +1,7 @@
 """Atomic output and content digests: nothing half-written is ever seen under its final name."""
 
 import hashlib
+import io
 import json
 import os
 import secrets
@@ -9,9 +10,12 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from semgrid_eval.errors import InputError
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 try:
     import fcntl
@@ -27,21 +31,43 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
     """Open a temporary file beside `path` for writing and move it into place when the block ends without error.
 
     Raises:
-        InputError: the folder cannot be written to.
+        InputError: the file cannot be written; errors of the block that are not about this file stay what they are.
     """
-    partial = _partial_name(path)
+    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with partial.open("wb") as stream:
+        with _writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            output = _Output(partial, path)
+        with io.BufferedWriter(output) as stream:
             yield stream
             stream.flush()
-            os.fsync(stream.fileno())
-        partial.replace(path)
-    except OSError as error:
-        raise InputError(f"cannot be written: {_reason(error)}", path=path) from error
+            with _writing(path):
+                os.fsync(stream.fileno())
+        with _writing(path):
+            partial.replace(path)
     finally:
         with suppress(OSError):  # it is gone after success, and its folder may never have been one
             partial.unlink()
+
+
+class _Output(io.FileIO):
+    """The temporary file of an output; a write that fails names the output."""
+
+    def __init__(self, partial: Path, path: Path) -> None:
+        self._path = path
+        super().__init__(partial, "wb")
+
+    def write(self, data: "ReadableBuffer", /) -> int:
+        with _writing(self._path):
+            return super().write(data)
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"cannot be written: {_reason(error)}", path=path) from error
 
 
 @contextmanager
@@ -53,11 +79,9 @@ def locked(folder: Path) -> Iterator[None]:
     Raises:
         InputError: the folder cannot be written to.
     """
-    try:
+    with _writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         stream = (folder / ".lock").open("ab")
-    except OSError as error:
-        raise InputError(f"cannot be written: {_reason(error)}", path=folder) from error
     with stream:
         if fcntl is not None:
             with suppress(OSError):
@@ -70,21 +94,22 @@ def atomic_folder(path: Path) -> Iterator[Path]:
     """Return a temporary folder beside `path` that becomes `path` (replacing it) when the block ends without error.
 
     Raises:
-        InputError: the folder cannot be written to.
+        InputError: the folder cannot be written to; errors of the block that name a file elsewhere stay what they are.
     """
-    try:
+    with _writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent))
-    except OSError as error:
-        raise InputError(f"cannot be written: {_reason(error)}", path=path) from error
     try:
         partial.chmod(0o755)
         yield partial
-        if path.exists():
-            shutil.rmtree(path)
-        partial.replace(path)
+        with _writing(path):
+            if path.exists():
+                shutil.rmtree(path)
+            partial.replace(path)
     except OSError as error:
-        raise InputError(f"cannot be written: {_reason(error)}", path=path) from error
+        if error.filename is None or Path(os.fsdecode(error.filename)).is_relative_to(partial):
+            raise InputError(f"cannot be written: {_reason(error)}", path=path) from error
+        raise
     finally:
         shutil.rmtree(partial, ignore_errors=True)
 
@@ -142,7 +167,3 @@ def digest_files(paths: Iterable[Path]) -> str:
 def _reason(error: OSError) -> str:
     # numpy has no error number for arrays that were written in part.
     return error.strerror or f"{error} (no space left?)"
-
-
-def _partial_name(path: Path) -> Path:
-    return path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")

@@ -1,4 +1,7 @@
+import errno
 import hashlib
+import os
+import resource
 
 import pytest
 
@@ -40,6 +43,45 @@ def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"file/x: cannot be written"), atomic_file(tmp_path / "file" / "x"):
         pass
+
+
+@pytest.mark.parametrize("output", [atomic_file, atomic_folder])
+def test_a_missing_input_read_while_writing_names_the_input(tmp_path, output):
+    with pytest.raises(FileNotFoundError) as raised, output(tmp_path / "out"):
+        (tmp_path / "input").read_bytes()
+    assert raised.value.filename == str(tmp_path / "input")
+    with pytest.raises(InputError, match="input: cannot be read"), output(tmp_path / "out"):
+        read_json(tmp_path / "input")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def little_room():
+    """Files of this process can have 4 KiB at most."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("size", [5000, 1 << 20])  # written by the flush at the end, or at once
+def test_a_write_that_fails_names_the_output(tmp_path, little_room, size):
+    with (
+        pytest.raises(InputError, match=r"out: cannot be written: File too large$") as raised,
+        atomic_file(tmp_path / "out") as stream,
+    ):
+        stream.write(b"1" * size)
+    assert raised.value.__cause__.errno == errno.EFBIG
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_names_the_folder(tmp_path):
+    with (
+        pytest.raises(InputError, match=r"out: cannot be written: No space"),
+        atomic_folder(tmp_path / "out") as folder,
+    ):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder / "a"))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_array_that_was_written_in_part_is_a_full_disk(tmp_path):
