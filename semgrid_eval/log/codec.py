@@ -41,6 +41,15 @@ def image_message(stamp_ns: int, camera: str, png: bytes) -> CompressedImage:
     return CompressedImage(timestamp=timestamp(stamp_ns), frame_id=optical_frame(camera), data=png, format="png")
 
 
+def read_image(data: bytes) -> bytes:
+    """Return the PNG file in a message.
+
+    Raises:
+        DecodeError: the message is damaged.
+    """
+    return bytes(CompressedImage.FromString(data).data)
+
+
 def calibration_messages(
     stamp_ns: int, camera: str, calibration: CameraCalibration, size_px: tuple[int, int]
 ) -> tuple[CalibrationMessage, StereoCalibration]:

@@ -1,9 +1,9 @@
 """The moments of a recording as messages in the order of time, and back."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-
-from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from itertools import groupby, product
+from typing import Any, NamedTuple
 
 from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError
@@ -86,84 +86,94 @@ class MomentWriter:
         self._writer.end_chunk()
 
 
-def moment_topics(cameras: Iterable[str]) -> list[str]:
-    """List the topics that `read_moments` reads."""
-    return [topics.EGO_MOTION, topics.EGO_POSE, topics.TRUE_POSE, topics.TRUE_ACTORS, *_picture_topics(cameras)]
+class Picture(NamedTuple):
+    """A PNG file of a camera; `channel` is one of `topics.PICTURES`."""
+
+    stamp_ns: int
+    camera: str
+    channel: str
+    png: bytes
 
 
-def read_moments(messages: Iterable[tuple[str, int, bytes]], cameras: Iterable[str]) -> Iterator[Moment]:
-    """Gather messages (topic, time in ns, data) of `moment_topics`, in the order of a log, into moments.
+class Decoded(NamedTuple):
+    """What a message says, and its topic and time."""
 
-    A moment is all that has one stamp; motion belongs to the moment that comes next. A frame without disparity, which
-    could not be placed in the world, is left out.
+    topic: str
+    stamp_ns: int
+    value: Any
 
-    Raises:
-        DecodeError: a message is damaged.
+
+def picture_topics(cameras: Iterable[str], channels: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Return camera and channel by topic."""
+    return {camera_topic(camera, channel): (camera, channel) for camera, channel in product(cameras, channels)}
+
+
+def moment_decoders(cameras: Iterable[str]) -> dict[str, Callable[[bytes], Any]]:
+    """Return what decodes the messages that `gather_moments` needs, by topic."""
+    return {
+        topics.EGO_MOTION: codec.read_motion,
+        topics.EGO_POSE: codec.read_pose,
+        topics.TRUE_POSE: codec.read_pose,
+        topics.TRUE_ACTORS: codec.read_actors,
+        **dict.fromkeys(picture_topics(cameras, topics.PICTURE_FIELDS), codec.read_image),
+    }
+
+
+def gather_moments(messages: Iterable[Decoded], cameras: Iterable[str]) -> Iterator[Moment]:
+    """Gather the messages of `moment_decoders`, in the order of a log, into moments.
+
+    A moment is all that has one stamp; motion belongs to the moment that comes next.
     """
-    pictures = _picture_topics(cameras)
+    shown = picture_topics(cameras, topics.PICTURE_FIELDS)
     motion: list[MotionSample] = []
     gathered: _Gathered | None = None
-    for topic, stamp_ns, data in messages:
+    for topic, stamp_ns, value in messages:
         if topic == topics.EGO_MOTION:
-            motion.append(codec.read_motion(data))
+            motion.append(value)
             continue
         if gathered is None or gathered.stamp_ns != stamp_ns:
             if gathered is not None:
                 yield gathered.moment()
             gathered = _Gathered(stamp_ns, tuple(motion))
             motion.clear()
-        if topic in pictures:
-            camera, picture = pictures[topic]
-            gathered.cameras.setdefault(camera, {})[picture] = read_picture(data)
-        else:
-            gathered.add_truth(topic, data)
+        gathered.add(topic, shown.get(topic), value)
     if gathered is not None:
         yield gathered.moment()
 
 
 @dataclass
 class _Gathered:
-    """What was read of one moment so far; pictures by camera and field of `CameraFrame`."""
+    """What was read of one moment so far."""
 
     stamp_ns: int
     motion: tuple[MotionSample, ...]
     pose: Pose | None = None
     actors: tuple[Actor, ...] | None = None
-    cameras: dict[str, dict[str, bytes]] = field(default_factory=dict)
+    pictures: list[Picture] = field(default_factory=list)
 
-    def add_truth(self, topic: str, data: bytes) -> None:
-        if topic == topics.TRUE_POSE:
-            self.pose = codec.read_pose(data)
+    def add(self, topic: str, shown: tuple[str, str] | None, value: Any) -> None:  # noqa: ANN401 - by topic
+        if shown is not None:
+            self.pictures.append(Picture(self.stamp_ns, *shown, value))
+        elif topic == topics.TRUE_POSE:
+            self.pose = value
         elif topic == topics.TRUE_ACTORS:
-            _, self.actors = codec.read_actors(data)
+            _, self.actors = value
 
     def moment(self) -> Moment:
-        frames = {camera: camera_frame(self.stamp_ns, pictures) for camera, pictures in self.cameras.items()}
-        placed = {camera: frame for camera, frame in frames.items() if frame is not None}
-        return Moment(self.stamp_ns, placed, self.motion, self.pose, self.actors)
+        return Moment(self.stamp_ns, dict(camera_frames(self.pictures)), self.motion, self.pose, self.actors)
 
 
-def camera_frame(stamp_ns: int, pictures: dict[str, bytes]) -> CameraFrame | None:
-    """Make a frame of pictures by field name; None without disparity."""
-    if "disparity_png" not in pictures:
-        return None
-    known = dict(pictures)
-    image_png, label_png = known.pop("image_png", None), known.pop("label_png", None)
-    return CameraFrame(stamp_ns, image_png=image_png, label_png=label_png, **known)
+def camera_frames(pictures: Iterable[Picture]) -> Iterator[tuple[str, CameraFrame]]:
+    """Make frames of pictures in the order of time: those of one camera and one stamp, and the camera's name.
 
-
-def read_picture(data: bytes) -> bytes:
-    """Read the PNG file in a message.
-
-    Raises:
-        DecodeError: the message is damaged.
+    A frame without label, image or truth has None there; one without disparity, which could not be placed in the
+    world, is left out.
     """
-    return bytes(CompressedImage.FromString(data).data)
-
-
-def _picture_topics(cameras: Iterable[str]) -> dict[str, tuple[str, str]]:
-    return {
-        camera_topic(camera, channel): (camera, picture)
-        for camera in cameras
-        for picture, (channel, _) in topics.PICTURES.items()
-    }
+    for stamp_ns, of_one_time in groupby(pictures, key=lambda picture: picture.stamp_ns):
+        by_camera: dict[str, dict[str, bytes]] = {}
+        for picture in of_one_time:
+            by_camera.setdefault(picture.camera, {})[topics.PICTURE_FIELDS[picture.channel]] = picture.png
+        for camera, found in by_camera.items():
+            image_png, label_png = found.pop("image_png", None), found.pop("label_png", None)
+            if "disparity_png" in found:
+                yield camera, CameraFrame(stamp_ns, image_png=image_png, label_png=label_png, **found)

@@ -22,6 +22,7 @@ class Scene:
         cameras: their names, sorted.
         source_digest: digest of everything that determined the content.
         class_names: the grid classes when the log was written.
+        group: the town, city or drive that it belongs to; empty where the log does not say.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Scene:
     cameras: tuple[str, ...]
     source_digest: str
     class_names: tuple[str, ...] = CLASS_NAMES
+    group: str = ""
 
     def to_metadata(self) -> dict[str, str]:
         """Return the entries of the metadata record, with a digest of their own: MCAP has no checksum for them."""
@@ -41,6 +43,7 @@ class Scene:
             "cameras": json.dumps(self.cameras),
             "source_digest": self.source_digest,
             "class_names": json.dumps(self.class_names),
+            **({"group": self.group} if self.group else {}),
         }
         return {**entries, "digest": digest_value(entries)}
 
@@ -66,4 +69,5 @@ class Scene:
             cameras=tuple(json.loads(given["cameras"])),
             source_digest=given["source_digest"],
             class_names=tuple(json.loads(given["class_names"])),
+            group=given.get("group", ""),
         )

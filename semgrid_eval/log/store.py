@@ -1,18 +1,25 @@
 """Write a recording as an MCAP log, find logs, and read them back moment by moment."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
-from itertools import groupby
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.files import atomic_file
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.container import Container, Entry, damage_as_log_error
-from semgrid_eval.log.moments import MomentWriter, camera_frame, moment_topics, read_moments, read_picture
+from semgrid_eval.log.moments import (
+    Decoded,
+    MomentWriter,
+    Picture,
+    camera_frames,
+    gather_moments,
+    moment_decoders,
+    picture_topics,
+)
 from semgrid_eval.log.scene import RECORD, Scene
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.log.writer import MessageWriter
@@ -62,6 +69,7 @@ def write_log(recording: Recording, path: Path) -> None:
         split=recording.split,
         cameras=tuple(sorted(recording.calibrations)),
         source_digest=recording.source_digest,
+        group=recording.group,
     )
     with atomic_file(path) as stream, MessageWriter(stream) as writer:
         writer.metadata(RECORD, scene.to_metadata())
@@ -71,7 +79,7 @@ def write_log(recording: Recording, path: Path) -> None:
 
 
 def read_recording(path: Path) -> Recording:
-    """Return what a log holds as a recording again; written anew, it makes the same bytes.
+    """Return what a log holds as a recording; written again, it makes the same bytes.
 
     Each pass over its moments opens the log and streams from it. Motion after the last moment is left out.
 
@@ -83,6 +91,7 @@ def read_recording(path: Path) -> Recording:
             name=log.scene.name,
             dataset=log.scene.dataset,
             split=log.scene.split,
+            group=log.scene.group,
             calibrations={camera: log.calibration(camera) for camera in log.scene.cameras},
             source_digest=log.scene.source_digest,
             moments=partial(_moments, path),
@@ -91,9 +100,8 @@ def read_recording(path: Path) -> Recording:
 
 
 def _moments(path: Path) -> Iterator[Moment]:
-    with LogReader(path) as log, damage_as_log_error(path):
-        cameras = log.scene.cameras
-        yield from read_moments(log.messages(moment_topics(cameras)), cameras)
+    with LogReader(path) as log:
+        yield from log.moments()
 
 
 class LogReader:
@@ -209,7 +217,7 @@ class LogReader:
         Raises:
             LogError: a sample is damaged or not a finite number.
         """
-        samples = list(self._decoded(topics.EGO_MOTION, codec.read_motion))
+        samples = list(self._values(topics.EGO_MOTION, codec.read_motion))
         for sample in samples:
             if not (math.isfinite(sample.speed_mps) and math.isfinite(sample.yaw_rate_radps)):
                 raise LogError(f"is not finite at {sample.stamp_ns} ns", path=self.path, field=topics.EGO_MOTION)
@@ -221,7 +229,7 @@ class LogReader:
         Raises:
             LogError: a pose is damaged.
         """
-        return list(self._decoded(topics.TRUE_POSE, codec.read_pose))
+        return list(self._values(topics.TRUE_POSE, codec.read_pose))
 
     def actors(self) -> Iterator[tuple[int, tuple[Actor, ...]]]:
         """Iterate over time stamps (ns) and the true boxes of all actors; nothing where the truth is not known.
@@ -229,7 +237,26 @@ class LogReader:
         Raises:
             LogError: what is read is damaged.
         """
-        return self._decoded(topics.TRUE_ACTORS, codec.read_actors)
+        return self._values(topics.TRUE_ACTORS, codec.read_actors)
+
+    def moments(self) -> Iterator[Moment]:
+        """Iterate over all that the log holds, moment by moment, in the order of time.
+
+        Raises:
+            LogError: what is read is damaged.
+        """
+        cameras = self.scene.cameras
+        return gather_moments(self._decoded(moment_decoders(cameras)), cameras)
+
+    def pictures(self, cameras: Iterable[str], channels: Iterable[str]) -> Iterator[Picture]:
+        """Iterate over the pictures of some channels of some cameras in the order of time.
+
+        Raises:
+            LogError: what is read is damaged.
+        """
+        wanted = picture_topics(cameras, channels)
+        for topic, stamp_ns, png in self._decoded(dict.fromkeys(wanted, codec.read_image)):
+            yield Picture(stamp_ns, *wanted[topic], png)
 
     def frames(self, camera: str, *, images: bool = False) -> Iterator[CameraFrame]:
         """Iterate over the frames of a camera in the order of time, one chunk of the file in memory at once.
@@ -245,14 +272,9 @@ class LogReader:
             LogError: there is no such camera, or what is read is damaged.
         """
         self.choose_camera(camera)
-        fields = {camera_topic(camera, channel): field for field, (channel, _) in topics.PICTURES.items()}
-        if not images:
-            del fields[camera_topic(camera, topics.IMAGE)]
-        for stamp_ns, messages in groupby(self.messages(fields), key=lambda message: message[1]):
-            with damage_as_log_error(self.path):
-                frame = camera_frame(stamp_ns, {fields[topic]: read_picture(data) for topic, _, data in messages})
-            if frame is not None:
-                yield frame
+        channels = [channel for channel in topics.PICTURE_FIELDS if images or channel != topics.IMAGE]
+        for _, frame in camera_frames(self.pictures([camera], channels)):
+            yield frame
 
     def messages(self, names: Iterable[str]) -> Iterator[tuple[str, int, bytes]]:
         """Iterate over topic, time (ns) and data of some topics' messages, in the order of time, then of the file.
@@ -274,11 +296,15 @@ class LogReader:
     def _topic(self, entry: Entry) -> str:
         return self._container.summary.channels[entry.channel_id].topic
 
-    def _decoded(self, topic: str, decode: Callable[[bytes], T]) -> Iterator[T]:
-        for entry in self._container.entries([topic]):
+    def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
+        """Iterate over what the messages of some topics say; `decoders` tells topics and what reads their messages."""
+        for topic, stamp_ns, data in self.messages(decoders):
             with damage_as_log_error(self.path):
-                value = decode(entry.data)
-            yield value
+                value = decoders[topic](data)
+            yield Decoded(topic, stamp_ns, value)
+
+    def _values(self, topic: str, decode: Callable[[bytes], T]) -> Iterator[T]:
+        return (decoded.value for decoded in self._decoded({topic: decode}))
 
     def _first(self, topic: str) -> bytes:
         for entry in self._container.entries([topic]):

@@ -45,6 +45,8 @@ PICTURES: dict[str, tuple[str, dict[str, str]]] = {
 
 The colour image, which scoring never reads, comes last and has a chunk of its own.
 """
+PICTURE_FIELDS = {channel: field for field, (channel, _) in PICTURES.items()}
+"""Field of `CameraFrame` by channel of a camera."""
 
 
 def camera_topic(camera: str, channel: str) -> str:

@@ -8,8 +8,6 @@ from google.protobuf.message import Message
 
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.log import codec, topics
-from semgrid_eval.log.container import damage_as_log_error
-from semgrid_eval.log.moments import read_picture
 from semgrid_eval.log.motion import DeadReckoning
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.log.topics import camera_topic
@@ -83,17 +81,14 @@ class Drive:
                 yield Outgoing(now.stamp_ns, topics.TRANSFORMS, message)
 
     def _pictures(self, first_ns: int, last_ns: int, shift_ns: int) -> Iterator[Outgoing]:
-        shown = {camera_topic(name, channel): (name, channel) for name in self.cameras for channel in _PICTURES}
         notes = dict(topics.PICTURES.values())
         calibrated: dict[str, int] = {}
-        for topic, stamp_ns, data in self._log.messages(shown):
+        for stamp_ns, camera, channel, png in self._log.pictures(self.cameras, _PICTURES):
             if stamp_ns < first_ns:
                 continue
             if stamp_ns > last_ns:
                 return
-            (camera, channel), now_ns = shown[topic], stamp_ns + shift_ns
-            with damage_as_log_error(self._log.path):
-                png = read_picture(data)
+            topic, now_ns = camera_topic(camera, channel), stamp_ns + shift_ns
             if calibrated.get(camera) != now_ns:
                 calibrated[camera] = now_ns
                 size_px = self._size_px(png, topic)

@@ -113,8 +113,9 @@ class Recording:
         split: `train`, `val` or `test`.
         calibrations: by camera name.
         source_digest: digest of everything that determines the content.
-        moments: starts a fresh pass over the recording, in the order of time.
+        moments: starts a new pass over the recording, in the order of time.
         source_files: one file's bytes by attachment name (`front_camera.json`), kept for the record.
+        group: the town, city or drive that it belongs to, with other recordings that may depend on it.
     """
 
     name: str
@@ -124,3 +125,4 @@ class Recording:
     source_digest: str
     moments: Callable[[], Iterator[Moment]]
     source_files: dict[str, bytes] = field(default_factory=dict)
+    group: str = ""

@@ -112,6 +112,7 @@ class Sources:
                     digest=recording.digest,
                     split=recording.split,
                     dataset=recording.dataset,
+                    group=getattr(recording, "group", ""),
                 )
         return self._sets[key]
 

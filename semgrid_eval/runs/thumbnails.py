@@ -13,9 +13,7 @@ from semgrid_eval.executors import Executor
 from semgrid_eval.grids.geometry import nearest_indices, unit_projection
 from semgrid_eval.log import topics
 from semgrid_eval.log.container import damage_as_log_error
-from semgrid_eval.log.moments import read_picture
 from semgrid_eval.log.store import LogReader
-from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.playback.drive import drive_poses
 from semgrid_eval.progress import Stage
 from semgrid_eval.recording.png import decode_colour, decode_ids, encode_gray, read_header, with_palette
@@ -84,13 +82,11 @@ def log_pictures(log: Path, digest: str, camera: str | None, stamps_ns: Iterable
             raise LogError(f"has digest {reader.digest}, not {digest}", path=log)
         name = reader.choose_camera(camera)
         drive = _drive(reader, name)
-        channels = {camera_topic(name, topics.IMAGE): "image", camera_topic(name, topics.LABEL): "label"}
-        for topic, stamp_ns, data in reader.messages(channels):
+        for stamp_ns, _, channel, png in reader.pictures([name], _SHRINK):
             if stamp_ns > max(wanted, default=-1):
                 break
             if stamp_ns in wanted:
-                with damage_as_log_error(log):
-                    found[stamp_ns][channels[topic]] = _SHRINK[channels[topic]](read_picture(data))
+                found[stamp_ns][channel] = _SHRINK[channel](png)
     return LogPictures(drive, {stamp: FramePictures(**files) for stamp, files in found.items()})
 
 
@@ -116,7 +112,7 @@ def small_label(png: bytes) -> bytes:
     return with_palette(encode_gray(small), label_palette()[: int(small.max()) + 1])
 
 
-_SHRINK = {"image": small_image, "label": small_label}
+_SHRINK = {topics.IMAGE: small_image, topics.LABEL: small_label}
 
 
 def _small_size(height: int, width: int) -> tuple[int, int]:
@@ -126,9 +122,9 @@ def _small_size(height: int, width: int) -> tuple[int, int]:
 
 def _drive(reader: LogReader, camera: str) -> Drive:
     poses = drive_poses(reader, camera)
-    _, _, first = next(reader.messages([camera_topic(camera, topics.DISPARITY)]))
+    first = next(reader.pictures([camera], [topics.DISPARITY]))
     with damage_as_log_error(reader.path):
-        header = read_header(read_picture(first))
+        header = read_header(first.png)
     return Drive(
         start_ns=reader.start_ns,
         track_ns=np.array([pose.stamp_ns for pose in poses], np.int64),

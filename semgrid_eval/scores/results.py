@@ -47,6 +47,7 @@ class LogRecord(Config):
     digest: str
     split: str
     dataset: str
+    group: str = ""
     fingerprint: str | None = None  # of a benchmark's log: what it is held against the published ones by
 
 

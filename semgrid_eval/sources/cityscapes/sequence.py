@@ -49,6 +49,7 @@ class CityscapesSequence:
     Args:
         name: that of its first frame.
         split: the folder that it lies in.
+        city: the folder in that of the split.
         camera_name: what its camera shall be called in the log.
         frames: in the order of their numbers.
         lost: where the image of the first lost frame should be; None where the numbers have no gap.
@@ -57,6 +58,7 @@ class CityscapesSequence:
 
     name: str
     split: str
+    city: str
     camera_name: str
     frames: tuple[SequenceFrame, ...]
     lost: Path | None
@@ -82,6 +84,7 @@ class CityscapesSequence:
             name=self.name,
             dataset="cityscapes",
             split=self.split,
+            group=self.city,
             calibrations={self.camera_name: self._calibration()},
             source_digest=digest,
             moments=lambda: self._moments(stamps_ns),

@@ -129,7 +129,13 @@ def _sequence(
         )
     first = run[0][1]
     return CityscapesSequence(
-        frame_name(first), first.parent.parent.name, camera_name, tuple(frames), _lost_image(run), train_ids
+        name=frame_name(first),
+        split=first.parent.parent.name,
+        city=first.parent.name,
+        camera_name=camera_name,
+        frames=tuple(frames),
+        lost=_lost_image(run),
+        train_ids=train_ids,
     )
 
 

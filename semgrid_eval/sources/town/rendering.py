@@ -25,7 +25,7 @@ from semgrid_eval.sources.town.traffic import Snapshot
 
 CAMERA_NAME = "front"
 RENDER_VERSION = 2
-"""Counts changes to what a plan renders to; logs of another version are rendered anew."""
+"""Counts changes to what a plan renders to; logs of another version are rendered again."""
 STAMP_JITTER_S = 0.001
 
 
@@ -62,6 +62,11 @@ class RecordingPlan:
         """Digest of everything that determines the content."""
         return digest_value({"plan": self.description(), "version": RENDER_VERSION})
 
+    @property
+    def group(self) -> str:
+        """Name of the town, `town03`, which its recordings' names begin with."""
+        return self.name.partition("_")[0]
+
     def description(self) -> dict[str, object]:
         """Return the plan as JSON values, without the place of the town on this machine."""
         values = asdict(self)
@@ -82,6 +87,7 @@ def render_recording(plan: RecordingPlan) -> Recording:
         name=plan.name,
         dataset=plan.dataset,
         split=plan.split,
+        group=plan.group,
         calibrations={CAMERA_NAME: calibration},
         source_digest=plan.digest,
         moments=partial(_moments, plan),
