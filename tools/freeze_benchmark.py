@@ -11,7 +11,10 @@ from pathlib import Path
 from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.executors import available_cores, local_executor
 from semgrid_eval.files import write_json
-from semgrid_eval.log.benchmarks import (
+from semgrid_eval.log.fingerprint import fingerprints
+from semgrid_eval.log.store import LogReader, find_logs, label_of
+from semgrid_eval.progress import silent
+from semgrid_eval.sources.benchmarks import (
     BENCHMARKS,
     SIZES,
     benchmark_digest,
@@ -19,9 +22,6 @@ from semgrid_eval.log.benchmarks import (
     load_benchmark,
     short_fingerprints,
 )
-from semgrid_eval.log.fingerprint import fingerprints
-from semgrid_eval.log.store import LogReader, find_logs, label_of
-from semgrid_eval.progress import silent
 from semgrid_eval.sources.town.benchmark import versions
 
 

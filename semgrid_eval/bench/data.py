@@ -12,9 +12,9 @@ from semgrid_eval.bench.material import Material
 from semgrid_eval.bench.measurement import Measurement, processor_s, wall_s
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.log.benchmarks import Stereo
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.store import read_recording, write_log
+from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town.drives import FRAME_COUNT
 from semgrid_eval.sources.town.kinds import KINDS
 from semgrid_eval.sources.town.recordings import RecordingPlan, render_recording

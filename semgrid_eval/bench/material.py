@@ -10,10 +10,10 @@ import numpy as np
 from semgrid_eval.bench.measurement import Settings
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.grids.build import GridRecording
-from semgrid_eval.log.benchmarks import Stereo
 from semgrid_eval.log.store import write_log
 from semgrid_eval.progress import silent
 from semgrid_eval.recording.types import Recording
+from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town.recordings import (
     RecordingPlan,
     SyntheticConfig,

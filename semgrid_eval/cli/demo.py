@@ -28,6 +28,7 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
     """
     from semgrid_eval.cli.convert import show
     from semgrid_eval.cli.run import show_run
+    from semgrid_eval.log.convert import Work
     from semgrid_eval.report.page.write import write_report
     from semgrid_eval.runs.matrix import load_matrix
     from semgrid_eval.runs.runner import RunOptions, run_matrix
@@ -37,7 +38,7 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
     start_s = time.monotonic()
     logs, run = out / "logs", out / "run"
     config = parse_config(SyntheticConfig, {"recordings": recordings, "seed": seed, "towns": TOWNS})
-    code = show(convert_town(config, logs, workers=workers, stage=progress), logs)
+    code = show(convert_town(config, logs, Work(workers, stage=progress)), logs)
     options = RunOptions(device, out / "grids", command_line(), grid_executor=local_executor(workers))
     record = run_matrix(load_matrix(PRESET), logs, run, options, stage=progress)
     page = write_report(run)

@@ -1,18 +1,38 @@
 """Convert recordings to logs, several at once: what is done is skipped, what fails is named, the rest goes on."""
 
 import errno
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
 from semgrid_eval.errors import InputError, LogError, SemgridError
-from semgrid_eval.executors import Executor, WorkerDied
+from semgrid_eval.executors import Executor, InProcess, WorkerDied, local_executor
 from semgrid_eval.log.store import SUFFIX, LogReader, write_log
-from semgrid_eval.progress import Progress
+from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.recording.types import Recording
 
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
+
+
+@dataclass(frozen=True)
+class Work:
+    """How a conversion is carried out; none of it changes what is written.
+
+    Args:
+        workers: processes of this machine at once.
+        executor: where recordings are converted; by default in those processes.
+        cache: folder of what a source keeps beside the logs; by default in the folder of the logs.
+        stage: shows progress.
+    """
+
+    workers: int = 1
+    executor: Executor | None = None
+    cache: Path | None = None
+    stage: Stage = silent_stage
+
+
+IN_PROCESS = Work()
 
 
 @dataclass(frozen=True)
@@ -23,7 +43,7 @@ class ConversionJob:
         name: of the recording, a valid file name without suffix.
         split: the folder its log goes to.
         digest: digest of everything that determines the content, or what computes it (in the other process).
-        load: gives the recording.
+        load: returns the recording.
     """
 
     name: str
@@ -39,17 +59,41 @@ class ConversionJob:
 
 @dataclass
 class ConversionSummary:
-    """What became of each recording, by split and name (`val/aachen_000000_000000`), sorted."""
+    """What became of each recording, by split and name (`val/aachen_000000_000000`), sorted.
+
+    Args:
+        written: new logs.
+        skipped: logs that are up to date.
+        failed: reasons.
+        all_splits: whether these are all recordings of all splits, so that no other log belongs beside theirs.
+        remark: what else the source has to say, one line.
+    """
 
     written: list[str] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
     failed: dict[str, str] = field(default_factory=dict)
+    all_splits: bool = False
+    remark: str = ""
+
+    @property
+    def labels(self) -> set[str]:
+        """Split and name of all recordings."""
+        return {*self.written, *self.skipped, *self.failed}
 
 
-def convert_recordings(
-    jobs: Sequence[ConversionJob], out: Path, *, executor: Executor, progress: Progress
+def convert_recordings(recordings: Iterable[Recording], out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
+    """Write the log OUT/<split>/<name>.mcap of each recording, as `convert_jobs` does, one after the other.
+
+    They need not be picklable, so they stay in this process; a source whose recordings take long makes jobs of them.
+    """
+    jobs = [ConversionJob(each.name, each.split, each.source_digest, partial(_itself, each)) for each in recordings]
+    return convert_jobs(jobs, out, replace(work, executor=InProcess()))
+
+
+def convert_jobs(
+    jobs: Sequence[ConversionJob], out: Path, work: Work = IN_PROCESS, *, label: str = "convert"
 ) -> ConversionSummary:
-    """Write the log OUT/<split>/<name>.mcap of each recording.
+    """Write the log OUT/<split>/<name>.mcap of each job's recording.
 
     A log that is whole and was made from inputs of the same digest is left as it is. A recording that fails, because
     its source is at fault, is named in the summary with its reason.
@@ -57,25 +101,19 @@ def convert_recordings(
     Args:
         jobs: the recordings.
         out: the folder of all logs.
-        executor: where recordings are converted.
-        progress: told after each recording.
+        work: how it is done.
+        label: what progress is called.
 
     Raises:
         InputError: two recordings have one name, or the disk is full.
     """
     _refuse_duplicates(jobs)
     summary = ConversionSummary()
-    for done, (index, outcome) in enumerate(executor.run(partial(_convert, out=out), jobs), start=1):
-        job = jobs[index]
-        if isinstance(outcome, WorkerDied):
-            summary.failed[job.label] = outcome.reason
-        elif outcome.disk_full:
-            raise InputError(f"{outcome.failure}; what is written is whole: make room, and the same command goes on")
-        elif outcome.failure is not None:
-            summary.failed[job.label] = outcome.failure
-        else:
-            (summary.written if outcome.written else summary.skipped).append(job.label)
-        progress(done, len(jobs), job.label)
+    executor = work.executor or local_executor(work.workers)
+    with work.stage(label) as progress:
+        for done, (index, outcome) in enumerate(executor.run(partial(_convert, out=out), jobs), start=1):
+            _note(outcome, jobs[index].label, summary)
+            progress(done, len(jobs), jobs[index].label)
     summary.written.sort()
     summary.skipped.sort()
     summary.failed = dict(sorted(summary.failed.items()))
@@ -89,6 +127,17 @@ class _Outcome:
     disk_full: bool = False
 
 
+def _note(outcome: _Outcome | WorkerDied, label: str, summary: ConversionSummary) -> None:
+    if isinstance(outcome, WorkerDied):
+        summary.failed[label] = outcome.reason
+    elif outcome.disk_full:
+        raise InputError(f"{outcome.failure}; what is written is whole: make room, and the same command goes on")
+    elif outcome.failure is not None:
+        summary.failed[label] = outcome.failure
+    else:
+        (summary.written if outcome.written else summary.skipped).append(label)
+
+
 def _convert(job: ConversionJob, out: Path) -> _Outcome:
     path = out / job.split / f"{job.name}{SUFFIX}"
     try:
@@ -96,13 +145,17 @@ def _convert(job: ConversionJob, out: Path) -> _Outcome:
         if _is_current(path, digest):
             return _Outcome(written=False)
         write_log(job.load(), path)
-    except SemgridError as error:
+    except (SemgridError, OSError) as error:  # OSError: of a file that the source did not find
         stale = f" (the log of an earlier conversion stays: {path})" if path.exists() else ""
         return _Outcome(written=False, failure=f"{error}{stale}", disk_full=_is_disk_full(error))
     return _Outcome(written=True)
 
 
-def _is_disk_full(error: SemgridError) -> bool:
+def _itself(recording: Recording) -> Recording:
+    return recording
+
+
+def _is_disk_full(error: Exception) -> bool:
     """Whether every further log would fail alike."""
     return isinstance(error.__cause__, OSError) and error.__cause__.errno in _DISK_FULL
 

@@ -10,12 +10,12 @@ from semgrid_eval.executors import Executor
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.build import GridDataSet, build_grids
 from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
-from semgrid_eval.log.benchmarks import published_fingerprints
 from semgrid_eval.log.fingerprint import kept_fingerprints
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.matrix import Row
 from semgrid_eval.scores.results import LogRecord
+from semgrid_eval.sources.benchmarks import published_fingerprints
 from semgrid_eval.windows.data import GridData, stack_recordings
 
 

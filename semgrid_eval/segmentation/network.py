@@ -84,7 +84,7 @@ class SegmentationNetwork:
         wrong = ((ids < 0) | (ids >= self._classes)) & (ids != _VOID)
         if wrong.any():
             kind = "label" if self._config.label_ids else "train"
-            raise self._error(f"gives the id {ids[wrong][0]}, which is no {kind} id", self._output)
+            raise self._error(f"gives the id {ids[wrong][0]}, which is not a {kind} id", self._output)
         return ids.astype(np.uint8)
 
     def _only_input(self) -> _Tensor:

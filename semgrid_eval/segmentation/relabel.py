@@ -1,4 +1,4 @@
-"""Logs anew, with the label images that a segmentation network gives for their colour images."""
+"""New logs of old ones, with the label images that a segmentation network gives for their colour images."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError, LogError
-from semgrid_eval.executors import Executor
 from semgrid_eval.files import digest_files, digest_value
-from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
+from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.log.store import LogReader, find_logs, read_recording
-from semgrid_eval.progress import Progress
 from semgrid_eval.recording.png import decode_colour, encode_gray
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 from semgrid_eval.segmentation.config import SegmentationConfig
@@ -28,13 +26,7 @@ Labeller = Callable[[NDArray[np.uint8]], NDArray[np.uint8]]
 
 
 def segment_logs(
-    logs: Sequence[Path],
-    model: Path,
-    config: SegmentationConfig,
-    out: Path,
-    *,
-    executor: Executor,
-    progress: Progress,
+    logs: Sequence[Path], model: Path, config: SegmentationConfig, out: Path, work: Work = IN_PROCESS
 ) -> ConversionSummary:
     """Write the log OUT/<split>/<name>.mcap for each log: all it holds, its label images made by a network.
 
@@ -46,8 +38,7 @@ def segment_logs(
         model: the ONNX file; files beside it whose names begin with its name (its weights) count as part of it.
         config: how the model is to be used.
         out: the folder of the new logs; it must not hold, or lie in, one of `logs`.
-        executor: where logs are worked on.
-        progress: told after each log.
+        work: how it is done.
 
     Raises:
         MissingExtraError: ONNX Runtime is not installed.
@@ -58,7 +49,7 @@ def segment_logs(
     paths = [path for given in logs for path in (find_logs(given) if given.is_dir() else [given])]
     SegmentationNetwork(model, config)  # a model that cannot be used is one error, not one for each log
     recipe = _Recipe(model, digest_files(_files_of(model)), config)
-    return convert_recordings([_job(path, recipe) for path in paths], out, executor=executor, progress=progress)
+    return convert_jobs([_job(path, recipe) for path in paths], out, work, label="segment")
 
 
 def relabelled(recording: Recording, label: Labeller) -> Recording:

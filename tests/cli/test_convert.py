@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 from support.cityscapes_tree import Tree, put
 
-from semgrid_eval.cli.convert import cityscapes, command
+from semgrid_eval.cli.convert import command
 from semgrid_eval.cli.main import main
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.store import LogReader, find_logs
+from semgrid_eval.sources.known import load_source
 
 
 def run(*arguments):
@@ -32,7 +33,7 @@ def labelled(tree, folder, *, kind="LabelIds", highest=33):
 def test_example_of_the_help_runs(tree, tmp_path, monkeypatch, capsys):
     labelled(tree, tmp_path / "predictions")
     monkeypatch.chdir(tmp_path)
-    program, *arguments = shlex.split(cityscapes.epilog.removeprefix("Example: "))
+    program, *arguments = shlex.split(load_source("cityscapes").example)
     assert program == "semgrid-eval"
     assert run(*arguments) == 0
     assert [path.relative_to(tmp_path) for path in find_logs(tmp_path)] == [Path("logs/val/aachen_000000_000000.mcap")]
@@ -105,15 +106,15 @@ def test_wrong_folder_is_one_line_without_traceback(tmp_path, capsys):
 
 
 def test_help_works_though_the_synthetic_extra_is_missing(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "semgrid_eval.cli.convert_synthetic", None)
+    monkeypatch.setitem(sys.modules, "semgrid_eval.sources.town.convert", None)
     assert run("convert", "--help") == 0
-    assert "needs the extra 'synthetic'" in capsys.readouterr().out
+    assert "synthetic   (semgrid_eval.sources.town.convert is not installed" in capsys.readouterr().out
     assert run("convert", "synthetic", "logs", "--recordings", 3) == 1
     assert "run: pip install 'semgrid-eval[synthetic]'" in capsys.readouterr().err
 
 
 def test_sources_are_listed():
-    assert command.list_commands(None) == ["cityscapes", "synthetic"]
+    assert command.list_commands(None) == ["cityscapes", "synthetic", "town-v1"]
 
 
 @pytest.mark.skipif(

@@ -1,16 +1,16 @@
 import errno
 import os
 import signal
+from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 
 import pytest
 from support.driving import driving
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.executors import local_executor
-from semgrid_eval.log.convert import ConversionJob, convert_recordings
+from semgrid_eval.log.convert import ConversionJob, Work, convert_jobs, convert_recordings
 from semgrid_eval.log.store import LogReader
-from semgrid_eval.progress import silent
 
 
 def refuse(reason):
@@ -26,7 +26,7 @@ def job(name, load=driving, digest="d" * 16):
 
 
 def convert(jobs, out, workers=1):
-    return convert_recordings(jobs, out, executor=local_executor(workers), progress=silent)
+    return convert_jobs(jobs, out, Work(workers))
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -90,7 +90,7 @@ def test_interrupted_conversion_leaves_whole_logs_and_goes_on_from_there(tmp_pat
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        convert_recordings(jobs, tmp_path, executor=local_executor(workers), progress=interrupt)
+        convert_jobs(jobs, tmp_path, Work(workers, stage=lambda label: nullcontext(interrupt)))
     left = [f"val/{path.stem}" for path in sorted((tmp_path / "val").iterdir())]
     assert left if workers == 2 else left == ["val/a"]  # another process may have finished its own
     summary = convert(jobs, tmp_path)
@@ -116,8 +116,30 @@ def test_a_full_disk_ends_the_conversion_in_one_line_and_what_is_written_stays(t
 def test_progress_names_every_recording_once(tmp_path):
     told = []
     jobs = [job("a"), job("b", partial(refuse, "is missing"))]
-    convert_recordings(jobs, tmp_path, executor=local_executor(1), progress=lambda *call: told.append(call))
-    assert told == [(1, 2, "val/a"), (2, 2, "val/b")]
+    convert_jobs(jobs, tmp_path, Work(stage=lambda label: nullcontext(lambda *call: told.append((label, *call)))))
+    assert told == [("convert", 1, 2, "val/a"), ("convert", 2, 2, "val/b")]
+
+
+def test_recordings_that_a_source_yields_are_converted(tmp_path):
+    def source():
+        for name in "ab":
+            yield replace(driving(), name=name, group="here")
+
+    assert convert_recordings(source(), tmp_path).written == ["val/a", "val/b"]
+    assert convert_recordings(source(), tmp_path).skipped == ["val/a", "val/b"]
+    with LogReader(tmp_path / "val/a.mcap") as log:
+        assert (log.scene.name, log.scene.group) == ("a", "here")
+
+
+def test_a_file_that_a_source_does_not_find_is_named_and_the_rest_is_converted(tmp_path):
+    def moments():
+        (tmp_path / "input").read_bytes()
+        yield
+
+    bad = job("bad", lambda: replace(driving(), moments=moments))
+    summary = convert([bad, job("good")], tmp_path / "logs")
+    assert summary.written == ["val/good"]
+    assert summary.failed == {"val/bad": f"[Errno 2] No such file or directory: '{tmp_path}/input'"}
 
 
 def test_nothing_to_convert_is_no_error(tmp_path):

@@ -1,4 +1,5 @@
 import json
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +13,8 @@ from support.driving import driving
 from support.onnx_models import FLAT, colour_network
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.executors import local_executor
+from semgrid_eval.log.convert import Work
 from semgrid_eval.log.store import LogReader, find_logs, read_recording, write_log
-from semgrid_eval.progress import silent
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.relabel import RECORD, segment_logs
@@ -35,9 +35,8 @@ def logs(tmp_path):
     return tmp_path / "logs"
 
 
-def segment(logs, model, config=CONFIG, *, workers=1, progress=silent):
-    out = model.with_name("labelled")
-    return segment_logs(logs, model, config, out, executor=local_executor(workers), progress=progress)
+def segment(logs, model, config=CONFIG, *, workers=1):
+    return segment_logs(logs, model, config, model.with_name("labelled"), Work(workers))
 
 
 def moments(path):
@@ -170,11 +169,9 @@ def test_failure_of_the_network_is_a_failure_of_the_log(logs, model):
 def test_new_logs_are_kept_apart_from_the_old(logs, model, tmp_path, out):
     whole = (logs / "val/a.mcap").read_bytes()
     with pytest.raises(InputError, match=r"out: holds, or lies in, .*; new logs need a folder of their own"):
-        segment_logs([logs], model, CONFIG, tmp_path / out, executor=local_executor(1), progress=silent)
+        segment_logs([logs], model, CONFIG, tmp_path / out)
     with pytest.raises(InputError, match=r"out: holds, or lies in, .*; new logs need a folder of their own"):
-        segment_logs(
-            [logs / "val/a.mcap"], model, CONFIG, tmp_path / "logs", executor=local_executor(1), progress=silent
-        )
+        segment_logs([logs / "val/a.mcap"], model, CONFIG, tmp_path / "logs")
     assert (logs / "val/a.mcap").read_bytes() == whole
 
 
@@ -186,5 +183,6 @@ def test_two_logs_of_one_name_are_refused(logs, model, tmp_path):
 
 def test_progress_names_every_log(logs, model):
     told = []
-    segment([logs], model, progress=lambda *call: told.append(call))
+    work = Work(stage=lambda label: nullcontext(lambda *call: told.append(call)))
+    segment_logs([logs], model, CONFIG, model.with_name("labelled"), work)
     assert told == [(1, 2, "val/a"), (2, 2, "val/b")]

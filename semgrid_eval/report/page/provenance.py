@@ -8,12 +8,12 @@ import pandas as pd
 import yaml
 
 from semgrid_eval.files import digest_value
-from semgrid_eval.log.benchmarks import FINGERPRINT_CHARACTERS, published_fingerprints
 from semgrid_eval.report.claims.scaling import scaling
 from semgrid_eval.report.page.commands import row_command
 from semgrid_eval.report.rows.load import Row, Run
 from semgrid_eval.report.tables.table import Cell, Line, Table, plural
 from semgrid_eval.scores.results import NOT_RUN, LogRecord, RunRecord
+from semgrid_eval.sources.benchmarks import FINGERPRINT_CHARACTERS, published_fingerprints
 
 WINDOW_COLUMNS = ("window_set", "recording", "log", "target_frame", "target_stamp_ns", "input_stamps_ns")
 

@@ -1,15 +1,61 @@
-"""How a benchmark's recordings are made: what to plan, and by which versions of what their bytes depend on."""
+"""The frozen data sets of the simulated town as logs, compared with what is published."""
 
 import platform
 from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
 
-from semgrid_eval.log.benchmarks import Benchmark, SizeName
+from pydantic import Field
+
+from semgrid_eval.config import Config
+from semgrid_eval.executors import local_executor
+from semgrid_eval.log.convert import IN_PROCESS, ConversionSummary, Work
+from semgrid_eval.log.fingerprint import fingerprints
+from semgrid_eval.log.store import SUFFIX
 from semgrid_eval.packages import installed_versions
+from semgrid_eval.sources.benchmarks import Benchmark, Comparison, SizeName, compare, load_benchmark
+from semgrid_eval.sources.source import Source
+from semgrid_eval.sources.town.convert import KEPT, convert_town
 from semgrid_eval.sources.town.recordings import SyntheticConfig
 from semgrid_eval.sources.town.rendering import RENDER_VERSION
 from semgrid_eval.sources.town.town import TOWN_VERSION
 
 _PACKAGES = ("numpy", "opencv-python-headless", "eclipse-sumo", "embreex")
+_HELP = """Make the frozen data set town-v1 of the simulated town, which is the same everywhere.
+
+It has 300 recordings for training and 120 for validation, or 2,975 and 500 with --size full. The last line says whether
+every recording is the published one. Logs that are up to date are left as they are, so that the same command goes on
+after a stop.
+"""
+
+
+class SizeOptions(Config):
+    """Which size of a benchmark."""
+
+    size: Annotated[SizeName, Field(description="Full is as large as the paper's data.")] = "small"
+
+
+def convert_benchmark(
+    benchmark: Benchmark, size: SizeName, out: Path, work: Work = IN_PROCESS
+) -> tuple[ConversionSummary, Comparison | None]:
+    """Write the logs of a frozen benchmark and compare them with the published ones, if none failed.
+
+    Raises:
+        InputError: SUMO failed, a folder cannot be written to, or a log cannot be read again.
+        MissingExtraError: SUMO or Embree is not installed.
+    """
+    summary = convert_town(config_of(benchmark, size), out, work, dataset=benchmark.dataset(size))
+    summary.all_splits = True
+    comparison = None
+    if not summary.failed:
+        labels = sorted(summary.labels)
+        logs = [out / f"{label}{SUFFIX}" for label in labels]
+        with work.stage("compare") as progress:
+            found = fingerprints(logs, executor=local_executor(work.workers), progress=progress)
+        comparison = compare(benchmark.sizes[size], dict(zip(labels, found, strict=True)))
+    name, made_with = f"{benchmark.name} {size}", benchmark.sizes[size].versions
+    summary.remark = _verdict(name, comparison, len(summary.labels), made_with)
+    return summary, comparison
 
 
 def config_of(benchmark: Benchmark, size: SizeName) -> SyntheticConfig:
@@ -40,3 +86,33 @@ def versions() -> dict[str, str]:
     """Return the versions of what the bytes of a recording depend on, and the processor's kind."""
     own = {"processor": platform.machine(), "town builder": str(TOWN_VERSION), "renderer": str(RENDER_VERSION)}
     return dict(sorted((own | installed_versions(_PACKAGES)).items()))
+
+
+def _verdict(name: str, comparison: Comparison | None, total: int, made_with: Mapping[str, str]) -> str:
+    """Say in one line whether the recordings are the published ones."""
+    if comparison is None:
+        return f"Warning: {name}: not compared with what is published, since recordings failed"
+    if comparison.published is None:
+        return f"{name}: digest {comparison.digest}; nothing is published yet to compare it with"
+    if comparison.digest == comparison.published:
+        return f"{name}: digest {comparison.digest}, as published"
+    others = ", ".join(f"{what} {theirs} (here {ours})" for what, (theirs, ours) in changed_versions(made_with).items())
+    why = f"published were made with {others}" if others else "the versions are the same, so processors differ"
+    return (
+        f"Warning: {name}: {len(comparison.differing)} of {total} recordings differ from the published ones, such as "
+        f"{comparison.differing[0]}; digest {comparison.digest}, published {comparison.published}; {why}"
+    )
+
+
+def _convert_town_v1(options: SizeOptions, out: Path, work: Work) -> ConversionSummary:
+    summary, _ = convert_benchmark(load_benchmark("town-v1"), options.size, out, work)
+    return summary
+
+
+TOWN_V1 = Source(
+    options=SizeOptions,
+    convert=_convert_town_v1,
+    help=_HELP,
+    example="semgrid-eval convert town-v1 logs --size small",
+    cache=KEPT,
+)

@@ -1,76 +1,48 @@
-"""The simulated town as logs: planned, rendered and, where it is a benchmark, held against what is published."""
+"""The simulated town as logs."""
 
 from functools import partial
 from pathlib import Path
 
-from semgrid_eval.executors import Executor, local_executor
-from semgrid_eval.log.benchmarks import Benchmark, Comparison, SizeName, compare
-from semgrid_eval.log.convert import ConversionJob, ConversionSummary, convert_recordings
-from semgrid_eval.log.fingerprint import fingerprints
-from semgrid_eval.log.store import SUFFIX
-from semgrid_eval.progress import Stage, silent_stage
-from semgrid_eval.sources.town.benchmark import config_of
+from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
+from semgrid_eval.sources.source import Source
 from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings, render_recording
 
 CACHE = ".towns"
+KEPT = f"Folder of towns.  [default: OUT/{CACHE}]"
+_HELP = """Simulate towns and drive through them: logs OUT/<split>/town<NN>_<recording>_000000.mcap.
+
+Traffic comes from Eclipse SUMO, pictures from ray casting with Embree; exact labels, disparity, instances, the pose
+and all road users with their velocities are on topics of their own. Training and validation have different towns.
+Logs that are up to date are left as they are, so that the same command goes on after a stop.
+"""
 
 
 def convert_town(
-    config: SyntheticConfig,
-    out: Path,
-    *,
-    workers: int,
-    cache: Path | None = None,
-    executor: Executor | None = None,
-    dataset: str = "synthetic",
-    stage: Stage = silent_stage,
+    config: SyntheticConfig, out: Path, work: Work = IN_PROCESS, *, dataset: str = "synthetic"
 ) -> ConversionSummary:
     """Simulate towns, draw recordings from them and write their logs; what is there already is kept.
 
     Args:
         config: of the data set.
         out: folder of the logs.
-        workers: processes at once.
-        cache: where towns are kept; by default `CACHE` in the folder of the logs.
-        executor: renders the recordings; by default those processes.
+        work: how it is done; towns are kept in its cache.
         dataset: the name that the logs carry.
-        stage: shows progress.
 
     Raises:
         InputError: SUMO failed, or a folder cannot be written to.
         MissingExtraError: SUMO or Embree is not installed.
     """
-    with stage("simulate") as progress:
-        plans = plan_recordings(config, cache or out / CACHE, progress, workers=workers, dataset=dataset)
+    with work.stage("simulate") as progress:
+        cache = work.cache or out / CACHE
+        plans = plan_recordings(config, cache, progress, workers=work.workers, dataset=dataset)
     jobs = [ConversionJob(plan.name, plan.split, plan.digest, partial(render_recording, plan)) for plan in plans]
-    with stage("render") as progress:
-        return convert_recordings(jobs, out, executor=executor or local_executor(workers), progress=progress)
+    return convert_jobs(jobs, out, work, label="render")
 
 
-def convert_benchmark(
-    benchmark: Benchmark,
-    size: SizeName,
-    out: Path,
-    *,
-    workers: int,
-    cache: Path | None = None,
-    executor: Executor | None = None,
-    stage: Stage = silent_stage,
-) -> tuple[ConversionSummary, Comparison | None]:
-    """Write the logs of a frozen benchmark and hold them against the published ones, if none failed.
-
-    Arguments are those of `convert_town`.
-
-    Raises:
-        InputError: SUMO failed, a folder cannot be written to, or a log cannot be read again.
-        MissingExtraError: SUMO or Embree is not installed.
-    """
-    config, dataset = config_of(benchmark, size), benchmark.dataset(size)
-    summary = convert_town(config, out, workers=workers, cache=cache, executor=executor, dataset=dataset, stage=stage)
-    if summary.failed:
-        return summary, None
-    labels = sorted(summary.written + summary.skipped)
-    logs = [out / f"{label}{SUFFIX}" for label in labels]
-    with stage("compare") as progress:
-        found = fingerprints(logs, executor=local_executor(workers), progress=progress)
-    return summary, compare(benchmark.sizes[size], dict(zip(labels, found, strict=True)))
+SOURCE = Source(
+    options=SyntheticConfig,
+    convert=convert_town,
+    help=_HELP,
+    example="semgrid-eval convert synthetic logs --recordings 2 --towns 2 --town-size-m 250 --duration-s 15",
+    cache=KEPT,
+)

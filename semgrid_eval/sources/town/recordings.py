@@ -11,8 +11,8 @@ from pydantic import Field, model_validator
 
 from semgrid_eval.config import Config
 from semgrid_eval.errors import MissingExtraError
-from semgrid_eval.log.benchmarks import Stereo
 from semgrid_eval.progress import Progress
+from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town.drives import choose_drives
 from semgrid_eval.sources.town.kinds import KINDS
 from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
@@ -20,37 +20,33 @@ from semgrid_eval.sources.town.town import TownSpec, load_town, prepare_town
 
 __all__ = ["RecordingPlan", "SyntheticConfig", "plan_recordings", "render_recording"]
 
+_STEREO = (
+    "Errors of labels, disparity and motion: drawn from a model; or disparity from matching a rendered stereo pair; "
+    "or none."
+)
 _POSITIONS_PER_KM2_S = 25_000
 _MAX_POSITIONS = 10_000_000  # of everybody in a town at every step; they are held in memory, some 200 bytes each
 
 
 class SyntheticConfig(Config):
-    """What a synthetic data set is made of.
+    """What a synthetic data set is made of."""
 
-    Args:
-        recordings: how many, of 30 frames each.
-        seed: the same seed gives the same bytes.
-        width: of the images in pixels.
-        height: of the images in pixels.
-        stereo: `modelled` gives labels, disparity and motion their errors; `matched` does, too, but gets disparity by
-            matching a rendered stereo pair; `exact` gives none.
-        towns: how many; each belongs to one split only.
-        val_share: of the recordings, and of the towns, that are for validation.
-        val_towns: how many towns are for validation, where it is another share than that of the recordings.
-        town_size_m: side of the square that a town's streets cover.
-        duration_s: simulated time of a town from which windows are taken.
-    """
-
-    recordings: Annotated[int, Field(ge=1, le=100_000)]
-    seed: Annotated[int, Field(ge=0, lt=1 << 31)] = 0
-    width: Annotated[int, Field(ge=64, le=4096)] = 512
-    height: Annotated[int, Field(ge=32, le=2048)] = 256
-    stereo: Stereo = "modelled"
-    towns: Annotated[int, Field(ge=1, le=100)] = 4
-    val_share: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.3
-    val_towns: Annotated[int, Field(ge=1)] | None = None
-    town_size_m: Annotated[float, Field(ge=250.0, le=2000.0)] = 450.0
-    duration_s: Annotated[float, Field(ge=10.0, le=3600.0)] = 90.0
+    recordings: Annotated[int, Field(ge=1, le=100_000, description="How many, of 30 frames each.")]
+    seed: Annotated[int, Field(ge=0, lt=1 << 31, description="The same seed gives the same bytes.")] = 0
+    towns: Annotated[int, Field(ge=1, le=100, description="How many; each belongs to one split only.")] = 4
+    val_share: Annotated[float, Field(ge=0.0, lt=1.0, description="Of recordings and of towns, for validation.")] = 0.3
+    val_towns: Annotated[
+        int | None, Field(ge=1, description="Towns for validation, if it is another share than of the recordings.")
+    ] = None
+    town_size_m: Annotated[float, Field(ge=250.0, le=2000.0, description="Side of the square that streets cover.")] = (
+        450.0
+    )
+    duration_s: Annotated[
+        float, Field(ge=10.0, le=3600.0, description="Simulated time of a town from which recordings are taken.")
+    ] = 90.0
+    width: Annotated[int, Field(ge=64, le=4096, description="Of the images in pixels.")] = 512
+    height: Annotated[int, Field(ge=32, le=2048, description="Of the images in pixels.")] = 256
+    stereo: Annotated[Stereo, Field(description=_STEREO)] = "modelled"
 
     @model_validator(mode="after")
     def _splits_need_towns(self) -> Self:

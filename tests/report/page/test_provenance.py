@@ -4,11 +4,11 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from semgrid_eval.log.benchmarks import load_benchmark
 from semgrid_eval.report.page.provenance import command_table, data_sets, duration, matrix_file, matrix_text
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.scores.results import read_run
+from semgrid_eval.sources.benchmarks import load_benchmark
 
 
 def test_every_row_has_its_command_and_says_what_became_of_it(run):

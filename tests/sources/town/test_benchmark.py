@@ -2,7 +2,7 @@
 
 import pytest
 
-from semgrid_eval.log.benchmarks import BENCHMARKS, load_benchmark
+from semgrid_eval.sources.benchmarks import BENCHMARKS, load_benchmark
 from semgrid_eval.sources.town.benchmark import config_of, versions
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from semgrid_eval.log.benchmarks import (
+from semgrid_eval.sources.benchmarks import (
     BENCHMARKS,
     SIZES,
     BenchmarkSize,

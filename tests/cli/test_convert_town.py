@@ -7,13 +7,12 @@ import pytest
 from click.testing import CliRunner
 from support.towns import SMALL, town_cache
 
-from semgrid_eval.cli import convert_synthetic
-from semgrid_eval.cli.convert_synthetic import synthetic
 from semgrid_eval.cli.main import cli, main
-from semgrid_eval.log.benchmarks import BenchmarkSize, SplitSize, load_benchmark
 from semgrid_eval.log.fingerprint import fingerprint
 from semgrid_eval.log.store import LogReader, find_logs
-from semgrid_eval.sources.town import sumo
+from semgrid_eval.sources.benchmarks import BenchmarkSize, SplitSize, load_benchmark
+from semgrid_eval.sources.known import load_source
+from semgrid_eval.sources.town import benchmark, sumo
 from semgrid_eval.sources.town.benchmark import versions
 
 LABELS = ("train/town00_000000_000000", "val/town01_000001_000000")
@@ -22,7 +21,7 @@ LABELS = ("train/town00_000000_000000", "val/town01_000001_000000")
 def run(capsys, *arguments):
     """Run the command line; return its exit code and the lines on stderr."""
     with pytest.raises(SystemExit) as stopped:
-        main(["convert", "synthetic", *(str(argument) for argument in arguments)])
+        main(["convert", *(str(argument) for argument in arguments)])
     return stopped.value.code, capsys.readouterr().err.splitlines()
 
 
@@ -39,7 +38,7 @@ def tiny(fingerprints=None, made_with=None):
 @pytest.fixture
 def define(monkeypatch):
     """Return what replaces the benchmark by a tiny one."""
-    return lambda *given: monkeypatch.setattr(convert_synthetic, "load_benchmark", lambda name: tiny(*given))
+    return lambda *given: monkeypatch.setattr(benchmark, "load_benchmark", lambda name: tiny(*given))
 
 
 @pytest.fixture(scope="module")
@@ -47,14 +46,14 @@ def rendered(tmp_path_factory):
     """Logs of the tiny benchmark, rendered once in this process."""
     out = tmp_path_factory.mktemp("rendered")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(convert_synthetic, "load_benchmark", lambda name: tiny())
-        done = CliRunner().invoke(cli, ["convert", "synthetic", str(out), *benchmark_options(1)])
+        patch.setattr(benchmark, "load_benchmark", lambda name: tiny())
+        done = CliRunner().invoke(cli, ["convert", *benchmark_options(out, 1)])
     assert done.exit_code == 0, done.output
     return out, done.output
 
 
-def benchmark_options(workers):
-    return ["--benchmark", "town-v1", "--cache", str(town_cache()), "--workers", str(workers)]
+def benchmark_options(out, workers):
+    return ["town-v1", str(out), "--cache", str(town_cache()), "--workers", str(workers)]
 
 
 def published(out):
@@ -63,7 +62,7 @@ def published(out):
 
 def test_the_example_writes_logs_and_a_second_run_keeps_them_and_warns_of_others(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    _, *arguments = shlex.split(synthetic.epilog.removeprefix("Example: "))
+    _, *arguments = shlex.split(load_source("synthetic").example)
     done = CliRunner().invoke(cli, arguments)
     assert done.exit_code == 0, done.output
     assert "2 written, 0 up to date, 0 failed" in done.output
@@ -99,7 +98,7 @@ def test_an_unpublished_benchmark_tells_its_digest_and_its_logs_carry_its_name(r
 def test_two_workers_elsewhere_render_the_published_bytes(rendered, define, tmp_path, capsys):
     out, _ = rendered
     define(published(out))
-    code, lines = run(capsys, tmp_path, *benchmark_options(2))
+    code, lines = run(capsys, *benchmark_options(tmp_path, 2))
     assert code == 0
     assert lines[-1].endswith("as published")
     for label in LABELS:
@@ -111,7 +110,7 @@ def test_an_interrupted_benchmark_goes_on_where_it_was(rendered, define, tmp_pat
     define(published(out))
     (tmp_path / "train").mkdir()
     shutil.copy(out / f"{LABELS[0]}.mcap", tmp_path / "train")
-    code, lines = run(capsys, tmp_path, *benchmark_options(1))
+    code, lines = run(capsys, *benchmark_options(tmp_path, 1))
     assert code == 0
     assert f"{tmp_path}: 1 written, 1 up to date, 0 failed" in lines
     assert lines[-1].endswith("as published")
@@ -121,7 +120,7 @@ def test_recordings_that_differ_are_a_warning_that_names_versions(rendered, defi
     out, _ = rendered
     train, _ = published(out).split()
     define(f"{train} 00000000", {**versions(), "eclipse-sumo": "1.0"})
-    code, lines = run(capsys, out, *benchmark_options(1))
+    code, lines = run(capsys, *benchmark_options(out, 1))
     assert code == 0
     assert lines[-1].startswith(
         "Warning: town-v1 small: 1 of 2 recordings differ from the published ones, such as val/"
@@ -135,28 +134,19 @@ def test_logs_that_do_not_belong_are_a_warning(rendered, define, tmp_path, capsy
     shutil.copytree(out, tmp_path, dirs_exist_ok=True)
     stray = tmp_path / "val/another.mcap"
     shutil.copy(out / f"{LABELS[0]}.mcap", stray)
-    code, lines = run(capsys, tmp_path, *benchmark_options(1))
+    code, lines = run(capsys, *benchmark_options(tmp_path, 1))
     assert code == 0
-    assert f"Warning: {tmp_path} holds 1 logs that do not belong to the benchmark, such as {stray}" in lines
+    assert f"Warning: {tmp_path} holds 1 logs that do not belong to this conversion, such as {stray}" in lines
 
 
-@pytest.mark.parametrize(
-    "option",
-    [["--recordings", "4"], ["--seed", "0"], ["--stereo", "exact"], ["--town-size-m", "450"], ["--width", "512"]],
-)
-def test_an_option_that_would_change_the_benchmark_is_refused(option, tmp_path, capsys):
-    code, lines = run(capsys, tmp_path, "--benchmark", "town-v1", *option)
-    assert (code, lines) == (1, [f"Error: {option[0]}: is fixed by --benchmark town-v1; leave it out"])
+def test_a_benchmark_has_no_options_that_would_change_it(tmp_path, capsys):
+    code, lines = run(capsys, "town-v1", tmp_path, "--seed", 1)
+    assert (code, lines[-1]) == (2, "Error: No such option '--seed'. Did you mean '--size'?")
 
 
-def test_a_size_without_a_benchmark_is_refused(tmp_path, capsys):
-    code, lines = run(capsys, tmp_path, "--recordings", 2, "--size", "full")
-    assert (code, lines) == (1, ["Error: --size: is the size of a benchmark; name one with --benchmark"])
-
-
-def test_neither_a_count_nor_a_benchmark_is_refused(tmp_path, capsys):
-    code, lines = run(capsys, tmp_path)
-    assert (code, lines[-1]) == (2, "Error: Missing option '--recordings', or '--benchmark'.")
+def test_how_many_recordings_must_be_said(tmp_path, capsys):
+    code, lines = run(capsys, "synthetic", tmp_path)
+    assert (code, lines[-1]) == (2, "Error: Missing option '--recordings'.")
 
 
 @pytest.mark.parametrize(
@@ -165,10 +155,11 @@ def test_neither_a_count_nor_a_benchmark_is_refused(tmp_path, capsys):
         (["--width", "1000000"], "Error: width: "),
         (["--towns", "1"], "Error: (top level): training and validation need different towns"),
         (["--duration-s", "0"], "Error: duration_s: "),
+        (["--val-towns", "0"], "Error: val_towns: "),
     ],
 )
 def test_an_impossible_wish_is_one_line(option, message, tmp_path, capsys):
-    code, lines = run(capsys, tmp_path, "--recordings", 2, *option)
+    code, lines = run(capsys, "synthetic", tmp_path, "--recordings", 2, *option)
     assert code == 1
     assert len(lines) == 1
     assert lines[0].startswith(message)
@@ -180,7 +171,7 @@ def test_a_failure_of_sumo_is_one_line_with_its_own_message(tmp_path, monkeypatc
     tool.write_text("#!/bin/sh\necho 'Error: the street is closed.' >&2\nexit 1\n")
     tool.chmod(0o755)
     monkeypatch.setattr(sumo, "sumo_home", lambda: tmp_path / "sumo")
-    code, lines = run(capsys, tmp_path / "logs", "--recordings", 2, "--workers", 1)
+    code, lines = run(capsys, "synthetic", tmp_path / "logs", "--recordings", 2, "--workers", 1)
     assert (code, lines) == (1, ["Error: SUMO's netgenerate failed with exit code 1: the street is closed."])
     assert list((tmp_path / "logs/.towns").iterdir()) == []
 
@@ -191,7 +182,7 @@ def test_a_disk_that_is_full_is_one_line_after_the_progress(define, tmp_path, mo
 
     define()
     monkeypatch.setattr(os, "fsync", fill)
-    code, lines = run(capsys, tmp_path, *benchmark_options(1))
+    code, lines = run(capsys, *benchmark_options(tmp_path, 1))
     assert code == 1
     assert [line for line in lines if not line.startswith("simulate: ")] == [
         f"Error: {tmp_path}/{LABELS[0]}.mcap: cannot be written: No space left on device; "

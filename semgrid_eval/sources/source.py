@@ -1,0 +1,31 @@
+"""What every source offers: options, and one call that converts what they choose to logs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from semgrid_eval.config import Config
+from semgrid_eval.log.convert import ConversionSummary, Work
+
+C = TypeVar("C", bound=Config)
+
+
+@dataclass(frozen=True)
+class Source(Generic[C]):
+    """What makes recordings, as the command line offers it.
+
+    Args:
+        options: what can be chosen. Each field is an option, described by its `description`; a path without default is
+            an argument.
+        convert: writes the logs OUT/<split>/<name>.mcap of what is chosen.
+        help: what the command does.
+        example: a use of the command.
+        cache: what the source keeps in the folder `Work.cache`, and where that is by default; empty if nothing.
+    """
+
+    options: type[C]
+    convert: Callable[[C, Path, Work], ConversionSummary]
+    help: str
+    example: str
+    cache: str = ""
