@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 # Logs and results of the reference run, which is not kept, and its report, which is.
 REFERENCE ?= build/reference
 REFERENCE_REPORT ?= reports/reference
-REFERENCE_LOGS ?= convert synthetic $(REFERENCE)/logs --benchmark town-v1 --size small
+REFERENCE_LOGS ?= convert town-v1 $(REFERENCE)/logs --size small
 REFERENCE_MATRIX ?= paper-cpu
 REFERENCE_COMMANDS := "$(REFERENCE_LOGS)" \
   "run $(REFERENCE_MATRIX) --logs $(REFERENCE)/logs --out $(REFERENCE)/run --jobs 2" \

@@ -1,6 +1,6 @@
 """Publish the digest of a benchmark's logs: writes it, with the versions that made them, into the package's definition.
 
-Example: semgrid-eval convert synthetic town --benchmark town-v1 --size small && python tools/freeze_benchmark.py town
+Example: semgrid-eval convert town-v1 town --size small && python tools/freeze_benchmark.py town
 """
 
 # ruff: noqa: T201 - the digest goes to stdout

@@ -1,0 +1,66 @@
+"""Make some recordings of town-v1 again and compare their fingerprints with the published ones.
+
+Example: python tools/check_benchmark.py --cache towns --recordings 30
+"""
+
+# ruff: noqa: T201 - the result goes to stdout
+
+import argparse
+import tempfile
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from semgrid_eval.errors import SemgridError
+from semgrid_eval.executors import available_cores, local_executor
+from semgrid_eval.log.fingerprint import fingerprint
+from semgrid_eval.log.store import write_log
+from semgrid_eval.progress import silent
+from semgrid_eval.sources.benchmarks import SIZES, SizeName, load_benchmark, short_fingerprints
+from semgrid_eval.sources.town.benchmark import changed_versions, config_of
+from semgrid_eval.sources.town.recordings import RecordingPlan, plan_recordings, render_recording
+
+
+def differing(size: SizeName, cache: Path, count: int) -> list[str]:
+    """Render `count` recordings spread over a size of town-v1; return split and name of those that differ."""
+    benchmark, workers = load_benchmark("town-v1"), available_cores()
+    chosen = benchmark.sizes[size]
+    plans = plan_recordings(config_of(benchmark, size), cache, silent, workers=workers, dataset=benchmark.dataset(size))
+    by_label = {f"{plan.split}/{plan.name}": plan for plan in plans}
+    published = dict(zip(sorted(by_label), (chosen.fingerprints or "").split(), strict=True))
+    some = _spread(sorted(by_label), count)
+    with tempfile.TemporaryDirectory() as folder:
+        executor = local_executor(workers)
+        found = dict(executor.run(partial(_fingerprint, folder=Path(folder)), [by_label[label] for label in some]))
+    short = short_fingerprints({some[index]: str(outcome) for index, outcome in found.items()})
+    return [label for label in some if short[label] != published[label]]
+
+
+def _spread(labels: Sequence[str], count: int) -> list[str]:
+    return [labels[index * len(labels) // count] for index in range(count)]
+
+
+def _fingerprint(plan: RecordingPlan, folder: Path) -> str:
+    path = folder / f"{plan.name}.mcap"
+    write_log(render_recording(plan), path)
+    found = fingerprint(path)
+    path.unlink()
+    return found
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--size", choices=SIZES, default="small")
+    parser.add_argument("--cache", type=Path, required=True, help="folder of towns")
+    parser.add_argument("--recordings", type=int, default=30)
+    given = parser.parse_args()
+    try:
+        others = differing(given.size, given.cache, given.recordings)
+    except SemgridError as error:
+        raise SystemExit(f"Error: {error}") from None
+    for label in others:
+        print(f"{label} differs")
+    print(f"town-v1 {given.size}: {given.recordings - len(others)} of {given.recordings} as published")
+    changed = changed_versions(load_benchmark("town-v1").sizes[given.size].versions)
+    print("".join(f"published were made with {what} {a}, here {b}\n" for what, (a, b) in changed.items()), end="")
+    raise SystemExit(1 if others else 0)
