@@ -37,6 +37,14 @@ def test_one_other_byte_in_one_message_changes_the_fingerprint(path, tmp_path):
     assert fingerprint(tmp_path / "changed.mcap") != fingerprint(path)
 
 
+def test_the_group_of_a_log_is_told_apart_by_its_digest_but_not_by_the_fingerprint(path, tmp_path):
+    grouped = tmp_path / "grouped.mcap"
+    write_log(replace(driving(), group="town03"), grouped)
+    assert fingerprint(grouped) == fingerprint(path)
+    with LogReader(grouped) as one, LogReader(path) as other:
+        assert one.digest != other.digest
+
+
 def test_fingerprints_come_in_the_order_of_the_logs(path, tmp_path):
     other = tmp_path / "other.mcap"
     write_log(replace(driving(), moments=lambda: iter(list(driving().moments())[:-1])), other)

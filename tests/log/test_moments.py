@@ -42,6 +42,16 @@ def test_moments_come_back_with_all_they_held(tmp_path):
     assert list(read.moments()) == list(read.moments())
 
 
+@pytest.mark.parametrize("group", ["", "town03"])
+def test_group_comes_back_and_a_log_without_one_says_nothing(tmp_path, group):
+    first, second = rewritten(replace(driving(), group=group), tmp_path)
+    assert first == second
+    assert read_recording(tmp_path / "first.mcap").group == group
+    with LogReader(tmp_path / "first.mcap") as log:
+        assert log.scene.group == group
+        assert ("group" in log.scene.to_metadata()) == bool(group)
+
+
 def test_motion_between_and_at_the_stamps_of_moments_stays_where_it_was(tmp_path):
     first, second, third, *_ = driving().moments()
     at_the_stamp_of_the_last = replace(second.motion[0], stamp_ns=first.stamp_ns, speed_mps=9.0)

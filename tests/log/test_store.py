@@ -78,6 +78,15 @@ def test_images_are_left_out_unless_asked_for(log):
     assert sum(frame.image_png is not None for frame in log.frames("front", images=True)) == 2
 
 
+def test_pictures_of_chosen_channels_come_in_the_order_of_time(log):
+    frames = list(log.frames("front", images=True))
+    labels = [("label", frame.stamp_ns, frame.label_png) for frame in frames if frame.label_png]
+    images = [("image", frame.stamp_ns, frame.image_png) for frame in frames if frame.image_png]
+    found = [(each.channel, each.stamp_ns, each.png) for each in log.pictures(["front"], ["image", "label"])]
+    assert found == sorted(labels + images, key=lambda entry: (entry[1], entry[0] == "image"))
+    assert {picture.camera for picture in log.pictures(["front"], ["image"])} == {"front"}
+
+
 def test_two_passes_at_once_do_not_disturb_each_other(log):
     alone = list(log.frames("front"))
     pairs = zip(log.frames("front"), log.frames("front"), strict=True)

@@ -57,6 +57,7 @@ def test_name_split_and_origin_are_kept(tree):
     tree.write(range(294, 300), sequence=2)
     recording = only(tree, camera_name="left").recording()
     assert (recording.name, recording.split, recording.dataset) == ("aachen_000002_000294", "val", "cityscapes")
+    assert recording.group == "aachen"
     assert list(recording.calibrations) == ["left"]
 
 
@@ -226,11 +227,11 @@ def test_time_that_does_not_grow_is_named(tree, step_ns):
 
 
 @pytest.mark.parametrize("text", ["", "1.5", "-3", "soon", "9" * 40, "٣"])
-def test_text_that_is_no_time_stamp_is_named(tree, text):
+def test_text_that_is_not_a_time_stamp_is_named(tree, text):
     names = tree.write(range(2))
     tree.timestamp(names[1]).write_text(text)
     assert fault(tree).startswith(f"{tree.timestamp(names[1])}: ")
-    assert "no time stamp in integer nanoseconds" in fault(tree)
+    assert "is not a time stamp in integer nanoseconds" in fault(tree)
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,12 @@ def exact_moments():
     return list(render_recording(small_plans(stereo="exact")[0]).moments())
 
 
+def test_recordings_of_a_town_are_a_group(plans):
+    groups = [render_recording(plan).group for plan in plans]
+    assert groups == ["town00", "town00", "town00", "town01"]
+    assert all("group" not in plan.description() for plan in plans)  # logs that were made before stay up to date
+
+
 def pixels(png: bytes):
     return np.asarray(Image.open(io.BytesIO(png)))
 
