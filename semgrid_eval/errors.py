@@ -32,7 +32,7 @@ class LogError(InputError):
 
 
 class ResultError(InputError):
-    """A result folder does not parse or does not belong where it lies."""
+    """A result folder does not parse or does not belong where it is."""
 
 
 class MissingExtraError(SemgridError):

@@ -34,7 +34,7 @@ _GRACE_S = 5.0  # for a process to end by itself
 
 @dataclass(frozen=True)
 class WorkerDied:
-    """Stands for the result of a piece of work whose process was killed, or that does not fit into memory."""
+    """Takes the place of the result of a piece of work whose process was killed, or that does not fit into memory."""
 
     reason: str = "a worker process was killed (out of memory?)"
 
@@ -78,7 +78,7 @@ class InProcess:
 
 
 class Processes:
-    """Works in several fresh processes of this machine, its cores and GPUs shared out among them.
+    """Works in several new processes of this machine, its cores and GPUs shared out among them.
 
     Args:
         workers: how many processes.

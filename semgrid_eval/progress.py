@@ -1,4 +1,4 @@
-"""How long work tells its caller how far it is; the command line shows it, tests and other programs may ignore it."""
+"""How long-running work reports its progress; the command line shows it, tests and other programs may ignore it."""
 
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -17,13 +17,13 @@ def silent(done: int, total: int, message: str = "") -> None:
 
 
 class Stage(Protocol):
-    """Opens the progress of one named stretch of work."""
+    """Opens the progress of one named stage of work."""
 
     def __call__(self, label: str) -> AbstractContextManager[Progress]:
-        """Begin a stretch called `label`; it ends when the block does."""
+        """Begin a stage called `label`; it ends when the block does."""
 
 
 @contextmanager
 def silent_stage(label: str) -> Iterator[Progress]:
-    """Open a stretch of work whose progress nobody watches."""
+    """Open a stage of work whose progress nobody watches."""
     yield silent

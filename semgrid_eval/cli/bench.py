@@ -19,7 +19,7 @@ _SHOWN = ("processor", "cpu_cores", "torch_threads", "device", "gpu", "python", 
 @click.option("--quick", is_flag=True, help="Once each, and the smallest network alone.")
 @click.option("--device", default="cpu", show_default=True, help="Of networks: auto, cpu, cuda or cuda:N.")
 @click.option(
-    "--json", "json_file", type=click.Path(path_type=Path, dir_okay=False), help="Write everything there, too."
+    "--json", "json_file", type=click.Path(path_type=Path, dir_okay=False), help="Also write everything there."
 )
 def command(only: str | None, device: str, json_file: Path | None, *, quick: bool) -> None:
     """Measure the speed of this machine: medians of three, some minutes on two cores.

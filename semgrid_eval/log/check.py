@@ -17,7 +17,7 @@ from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.png import decode_gray, read_header
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame, MotionSample
 
-# What a road vehicle and its stereo camera can plausibly be; outside lies a unit or sign error, or a broken sensor.
+# What a road vehicle and its stereo camera can plausibly be; beyond: a wrong unit or sign, or a broken sensor.
 FOCAL_PER_WIDTH = (0.2, 5.0)
 FOCAL_RATIO = (0.9, 1.1)
 CENTRE_PER_SIZE = (0.2, 0.8)
@@ -86,7 +86,7 @@ def check_log(path: Path) -> LogReport:
         with LogReader(path) as log:
             log.verify()
             stamps_ns = log.stamps_ns()
-            for finding in _findings(log, stamps_ns):  # one by one: those before damage count, too
+            for finding in _findings(log, stamps_ns):  # one by one: those before damage count as well
                 findings.append(finding)
     except LogError as error:
         findings.append(_error("file", str(error).removeprefix(f"{path}: ")))

@@ -1,4 +1,4 @@
-"""Read an MCAP file safely: indexed, bounded in memory, checksums held against the bytes, one error for all damage."""
+"""Read an MCAP file safely: indexed, bounded in memory, checksums verified, one error for all damage."""
 
 import hashlib
 import heapq
@@ -59,7 +59,7 @@ def damage_as_log_error(path: Path) -> Iterator[None]:
 
 
 class Entry(NamedTuple):
-    """One message as it lies in the file."""
+    """One message as it is stored in the file."""
 
     channel_id: int
     log_ns: int
@@ -150,7 +150,7 @@ class Container:
         return found
 
     def verify_data(self) -> bool:
-        """Hold the checksum of the whole data section against its bytes; False where the writer left it out.
+        """Verify the checksum of the whole data section; return False where the writer left it out.
 
         Raises:
             LogError: they differ.
@@ -207,7 +207,7 @@ class Container:
                 if message.channel_id not in self.summary.channels:
                     raise McapError(f"a message belongs to the unknown channel {message.channel_id}")
                 if not index.message_start_time <= message.log_time <= index.message_end_time:
-                    raise McapError("a message lies outside the times that the index gives")
+                    raise McapError("a message is outside the times that the index gives")
         for message in found:
             if message.channel_id in wanted:
                 yield Entry(message.channel_id, message.log_time, message.data)
@@ -215,8 +215,8 @@ class Container:
     def _chunk_records(self, index: ChunkIndex) -> list[McapRecord]:
         body = self._record(Opcode.CHUNK, index.chunk_start_offset, index.chunk_length)
         chunk = Chunk.read(ReadDataStream(io.BytesIO(body)))
-        told = (index.compression, index.compressed_size, index.uncompressed_size)
-        if (chunk.compression, len(chunk.data), chunk.uncompressed_size) != told:
+        declared = (index.compression, index.compressed_size, index.uncompressed_size)
+        if (chunk.compression, len(chunk.data), chunk.uncompressed_size) != declared:
             raise McapError("a chunk is not what the index says")
         chunk.data = _decompress(chunk)
         chunk.compression = ""
@@ -228,7 +228,7 @@ class Container:
             raise McapError("its index points outside the file")
         record = self._read(offset, length)
         if _HEADER.unpack_from(record) != (opcode, length - _HEADER.size):
-            raise McapError(f"its index points at something that is no {opcode.name.lower()}")
+            raise McapError(f"its index points at something that is not a {opcode.name.lower()}")
         return record[_HEADER.size :]
 
     def _read(self, offset: int, length: int) -> bytes:

@@ -20,7 +20,7 @@ _MESSAGE = struct.Struct("<qQ")
 def fingerprint(path: Path) -> str:
     """Digest the messages of a log: topics, times and bytes in the order of time (16 hexadecimal characters).
 
-    `LogReader.digest` also tells versions and compression apart; this does not.
+    `LogReader.digest` also depends on versions, compression and metadata; this does not.
 
     Raises:
         LogError: the log cannot be read or is damaged.
@@ -57,7 +57,7 @@ def kept_fingerprints(
         logs: paths by digest.
         cache: folder that keeps what was found, so that it is found once.
         executor: reads the logs.
-        progress: told of each log that is read.
+        progress: called for each log that is read.
     """
     kept = _kept(cache / KEPT)
     missing = [digest for digest in logs if digest not in kept]

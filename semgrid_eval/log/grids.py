@@ -23,7 +23,7 @@ _COLOURS = ("red", "green", "blue", "alpha")
 
 @dataclass(frozen=True)
 class GridPlace:
-    """Where a grid lies: edge of a cell, and the outer corner of cell (0, 0), ahead and left of the grid frame."""
+    """Where a grid is: edge of a cell, and the outer corner of cell (0, 0), ahead and left of the grid frame."""
 
     cell_m: float
     corner_x_m: float
@@ -118,11 +118,11 @@ def exact_message(stamp_ns: int, values: Values, layer: GridLayer, place: GridPl
 
 
 def read_exact(data: bytes) -> tuple[Values, GridPlace]:
-    """Read the values (H, W) of an exact message, and where they lie.
+    """Read the values (H, W) of an exact message, and where the grid is.
 
     Raises:
         DecodeError: the message is damaged.
-        ValueError: it holds another number of cells than it tells.
+        ValueError: it holds another number of cells than it states.
     """
     message = SemanticGrid.FromString(data)
     place = GridPlace(message.cell_size_m, message.corner_x_m, message.corner_y_m)

@@ -102,7 +102,7 @@ class LogReader:
         """Return the times of all messages by topic, ascending; this reads the whole file.
 
         Raises:
-            LogError: what is read is damaged, or the index tells another number of messages.
+            LogError: what is read is damaged, or the index states another number of messages.
         """
         found: dict[str, list[int]] = {topic: [] for topic in self.schemas()}
         for entry in self._container.entries():
@@ -110,7 +110,7 @@ class LogReader:
         count = sum(len(stamps) for stamps in found.values())
         if count != self._container.message_count:
             raise LogError(
-                f"holds {count} messages, but its index tells {self._container.message_count}", path=self.path
+                f"holds {count} messages, but its index states {self._container.message_count}", path=self.path
             )
         return found
 
@@ -186,7 +186,7 @@ class LogReader:
 
         Args:
             camera: its name.
-            images: whether to read the colour images, too.
+            images: whether to read the colour images as well.
 
         Raises:
             LogError: there is no such camera, or what is read is damaged.
@@ -217,7 +217,7 @@ class LogReader:
         return self._container.summary.channels[entry.channel_id].topic
 
     def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
-        """Iterate over what the messages of some topics say; `decoders` tells topics and what reads their messages."""
+        """Iterate over what the messages of some topics say; `decoders` maps topics to what reads their messages."""
         for topic, stamp_ns, data in self.messages(decoders):
             with damage_as_log_error(self.path):
                 value = decoders[topic](data)

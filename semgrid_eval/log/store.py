@@ -72,7 +72,7 @@ def read_recording(path: Path) -> Recording:
     Each pass over its moments opens the log and streams from it. Motion after the last moment is left out.
 
     Raises:
-        LogError: the file cannot be read or is damaged; what is found only in passing is raised in passing.
+        LogError: the file cannot be read or is damaged; what is found only while streaming is raised then.
     """
     with LogReader(path) as log:
         return Recording(

@@ -1,4 +1,4 @@
-"""PNG files as bytes: read headers, decode gray and palette pictures, give label images colours without decoding."""
+"""PNG files as bytes: read headers, decode gray and palette pictures, add palettes to label images without decoding."""
 
 import io
 import struct

@@ -1,4 +1,4 @@
-"""What every source gives and every log holds: calibrated camera frames, motion samples and, where known, the truth."""
+"""What every source yields and every log holds: calibrated camera frames, motion samples and, truth where known."""
 
 import math
 from collections.abc import Callable, Iterator

@@ -1,1 +1,1 @@
-"""Label images where a log has none: a segmentation network looks at the colour images."""
+"""Label images for logs without any, by a segmentation network that sees their colour images."""

@@ -22,7 +22,7 @@ Shape = Sequence[int | str | None]
 
 
 class _Tensor(NamedTuple):
-    """One input or output of a model, as ONNX Runtime tells it."""
+    """One input or output of a model, as ONNX Runtime describes it."""
 
     name: str
     type: str
@@ -30,7 +30,7 @@ class _Tensor(NamedTuple):
 
 
 class SegmentationNetwork:
-    """Gives label images for colour images.
+    """Labels colour images.
 
     Args:
         path: the ONNX file.
@@ -168,7 +168,7 @@ def _open(path: Path) -> Any:  # noqa: ANN401 - ONNX Runtime has no types
     if not path.is_file():
         raise InputError("is not a file", path=path, field="model")
     settings = onnxruntime.SessionOptions()
-    settings.log_severity_level = 4  # what is wrong comes as an exception, too
+    settings.log_severity_level = 4  # what is wrong also comes as an exception
     settings.intra_op_num_threads = _threads()
     try:
         return onnxruntime.InferenceSession(path, settings, providers=["CPUExecutionProvider"])

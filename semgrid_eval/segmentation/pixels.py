@@ -25,7 +25,7 @@ def network_input(
 
 
 def best_class(scores: NDArray[np.floating], size: Size, *, smooth: bool) -> NDArray[np.uint8]:
-    """Bring scores to a size and take the class of the highest, the first of equal ones: (C, h, w) -> (H, W).
+    """Resize scores and take the class of the highest, the first of equal ones: (C, h, w) -> (H, W).
 
     One class is scaled at a time, so that the scores of all at full size are never in memory.
 
@@ -45,7 +45,7 @@ def best_class(scores: NDArray[np.floating], size: Size, *, smooth: bool) -> NDA
 
 
 def nearest(ids: NDArray[np.uint8], size: Size) -> NDArray[np.uint8]:
-    """Bring ids to a size, each from the pixel in which its centre lies: (h, w) -> (H, W)."""
+    """Resize ids, each from the pixel that holds its centre: (h, w) -> (H, W)."""
     if size == size_of(ids):
         return ids
     columns, rows = ((2 * np.arange(new) + 1) * old // (2 * new) for new, old in zip(size, size_of(ids), strict=True))

@@ -37,7 +37,7 @@ def segment_logs(
         logs: files, and folders of which all logs are taken.
         model: the ONNX file; files beside it whose names begin with its name (its weights) count as part of it.
         config: how the model is to be used.
-        out: the folder of the new logs; it must not hold, or lie in, one of `logs`.
+        out: the folder of the new logs; it must not contain, or be inside, one of `logs`.
         work: how it is done.
 
     Raises:
@@ -53,7 +53,7 @@ def segment_logs(
 
 
 def relabelled(recording: Recording, label: Labeller) -> Recording:
-    """Replace the label images of a recording by what `label` gives for its colour images, (H, W, 3) -> (H, W).
+    """Replace the label images of a recording by what `label` returns for its colour images, (H, W, 3) -> (H, W).
 
     A frame without colour image has no label image then; if none has one, the pass over the moments ends with an
     InputError.
@@ -86,7 +86,7 @@ class _Recipe:
     config: SegmentationConfig
 
     def record(self, log_digest: str) -> dict[str, object]:
-        """Say what made the labels of a log."""
+        """Return what made the labels of a log."""
         return {
             "model": self.model.name,
             "model_digest": self.model_digest,
@@ -137,4 +137,6 @@ def _refuse_mixing(logs: Sequence[Path], out: Path) -> None:
     for path in logs:
         source = path.resolve()
         if source.is_relative_to(target) or target.is_relative_to(source):
-            raise InputError(f"holds, or lies in, {path}; new logs need a folder of their own", path=out, field="out")
+            raise InputError(
+                f"contains or is inside {path}; new logs need a folder of their own", path=out, field="out"
+            )

@@ -41,7 +41,7 @@ class BenchmarkSize(Config):
         val: recordings to score on.
         fingerprints: the first characters of every recording's, in the order of split and name, with blanks between;
             null until published.
-        versions: of what made the published recordings, as `versions` tells them.
+        versions: of what made the published recordings, as `versions` returns them.
     """
 
     seed: int
@@ -93,7 +93,7 @@ class Comparison:
 
 
 def definition_file(name: str) -> Path:
-    """Return where the definition of a benchmark, one of `BENCHMARKS`, lies in the package."""
+    """Return the file in the package that defines a benchmark, one of `BENCHMARKS`."""
     assert name in BENCHMARKS
     return Path(semgrid_eval.__file__).parent / "data" / f"{name}.json"
 
@@ -105,7 +105,7 @@ def load_benchmark(name: str) -> Benchmark:
 
 
 def compare(size: BenchmarkSize, found: Mapping[str, str]) -> Comparison:
-    """Hold the fingerprints of a benchmark's recordings, by split and name, against the published ones."""
+    """Compare the fingerprints of a benchmark's recordings, by split and name, with the published ones."""
     if size.fingerprints is None:
         return Comparison(benchmark_digest(found), None, ())
     published = dict(zip(sorted(found), size.fingerprints.split(), strict=True))

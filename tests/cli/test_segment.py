@@ -64,7 +64,7 @@ def test_failed_log_gives_exit_code_1(place, capsys):
         (("--std", 1, 0, 1), "Error: std.1: Input should be greater than 0 (found 0.0)\n"),
         (("--size", 0, 8), "Error: size.0: Input should be greater than or equal to 1 (found 0)\n"),
         (("--output", "aux"), "Error: network.onnx: output: there is no aux; there are: answer\n"),
-        (("--label-ids", "--out", "logs"), "Error: logs: out: holds, or lies in, logs; new logs need a folder"),
+        (("--label-ids", "--out", "logs"), "Error: logs: out: contains or is inside logs; new logs need a folder"),
     ],
 )
 def test_mistakes_are_one_line(place, capsys, option, message):

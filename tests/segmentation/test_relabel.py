@@ -168,9 +168,9 @@ def test_failure_of_the_network_is_a_failure_of_the_log(logs, model):
 @pytest.mark.parametrize("out", ["logs", ".", "logs/labelled"])
 def test_new_logs_are_kept_apart_from_the_old(logs, model, tmp_path, out):
     whole = (logs / "val/a.mcap").read_bytes()
-    with pytest.raises(InputError, match=r"out: holds, or lies in, .*; new logs need a folder of their own"):
+    with pytest.raises(InputError, match=r"out: contains or is inside .*; new logs need a folder of their own"):
         segment_logs([logs], model, CONFIG, tmp_path / out)
-    with pytest.raises(InputError, match=r"out: holds, or lies in, .*; new logs need a folder of their own"):
+    with pytest.raises(InputError, match=r"out: contains or is inside .*; new logs need a folder of their own"):
         segment_logs([logs / "val/a.mcap"], model, CONFIG, tmp_path / "logs")
     assert (logs / "val/a.mcap").read_bytes() == whole
 

@@ -82,7 +82,7 @@ def read_stamp(path: Path) -> int:
     """Read `*_timestamp.txt`: integer nanoseconds.
 
     Raises:
-        InputError: it is missing or no such number.
+        InputError: it is missing or is not such a number.
     """
     text = read_file(path).strip()
     if not text.isdigit() or len(text) > 19 or int(text) > _LAST_STAMP_NS:

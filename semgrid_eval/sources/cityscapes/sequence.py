@@ -1,4 +1,4 @@
-"""One recording of a Cityscapes tree: its files, their digest, and the moments that they give."""
+"""One recording of a Cityscapes tree: its files, their digest, and the moments they hold."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class CityscapesSequence:
 
     Args:
         name: that of its first frame.
-        split: the folder that it lies in.
+        split: the folder that it is in.
         city: the folder in that of the split.
         camera_name: what its camera shall be called in the log.
         frames: in the order of their numbers.
@@ -153,7 +153,7 @@ def frame_name(image: Path) -> str:
 
 
 def sibling(image: Path, channel: str, suffix: str) -> Path:
-    """Return where the file of another channel lies that belongs to an image."""
+    """Return the path of another channel's file that belongs to an image."""
     split, city = image.parent.parent, image.parent
     return split.parent.parent / channel / split.name / city.name / f"{frame_name(image)}{suffix}"
 

@@ -102,7 +102,7 @@ def _closest(
 
 
 def _is_drivable(traffic: Traffic, window: Drive) -> bool:
-    """Say whether a car could have driven this, and nobody stands inside the ego vehicle (SUMO lets some overlap)."""
+    """Return whether a car could have driven this, and nobody stands inside the ego vehicle (in SUMO some overlap)."""
     path = ego_path(traffic, window)
     if path is None or np.abs(path.yaw_rate_radps).max() > MAX_YAW_RATE_RADPS:
         return False

@@ -97,7 +97,7 @@ class LabelNoise:
 
 
 class DisparityErrors:
-    """Gives exact disparities, frame after frame, the errors of stereo matching; invalid is 0."""
+    """Adds the errors of stereo matching to exact disparities, frame after frame; invalid is 0."""
 
     def __init__(self, noise: DisparityNoise, rng: np.random.Generator) -> None:
         self._noise = noise
@@ -139,7 +139,7 @@ class DisparityErrors:
 
 
 class LabelErrors:
-    """Gives exact labels, frame after frame, the errors of a segmentation network: bent borders, bad patches."""
+    """Adds the errors of a segmentation network to exact labels, frame after frame: bent borders, bad patches."""
 
     def __init__(self, noise: LabelNoise, rng: np.random.Generator) -> None:
         self._noise = noise
@@ -215,7 +215,7 @@ def _fattened(disparity_px: NDArray[np.float32], share: float, rng: np.random.Ge
 
 
 def _is_occluded(disparity_px: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Say which points (H, W) of the left image something nearer hides from the right camera."""
+    """Return which points (H, W) of the left image something nearer hides from the right camera."""
     column_right = np.arange(disparity_px.shape[1], dtype=np.float32) - disparity_px
     nearest = np.minimum.accumulate(column_right[:, ::-1], axis=1)[:, ::-1]
     return nearest < column_right - np.float32(0.5)
@@ -224,7 +224,7 @@ def _is_occluded(disparity_px: NDArray[np.float32]) -> NDArray[np.bool_]:
 def _match_sky(
     noisy_px: NDArray[np.float32], exact_px: NDArray[np.float32], share: float, rng: np.random.Generator
 ) -> None:
-    """Give patches of the sky a small disparity, as matching does where there is nothing to match."""
+    """Set a small disparity in patches of the sky, as matching does where there is nothing to match."""
     shape = exact_px.shape
     patches = (exact_px <= 0.0) & (_smooth_field(shape, 0.01 * shape[1], rng) > _threshold(share))
     wrong = np.abs(_smooth_field(shape, 0.02 * shape[1], rng)) * np.float32(2.0 * shape[1] / 512)

@@ -75,7 +75,7 @@ def plan_recordings(
     Args:
         config: of the data set.
         cache_dir: where towns are kept.
-        progress: told of each finished town.
+        progress: called for each finished town.
         workers: towns simulated at the same time; the plans do not depend on it.
         dataset: the name that the logs carry.
 
@@ -103,7 +103,7 @@ class _Share:
 
 
 def _shares(config: SyntheticConfig) -> list[_Share]:
-    """Give each split towns of its own, of the same kinds in the same order, and each town its recordings."""
+    """Share out towns to splits, of the same kinds in the same order for each, and recordings to towns."""
     # Training keeps a town, however large the share of validation is.
     by_share = min(config.towns - 1, max(1, round(config.towns * config.val_share))) if config.val_share > 0.0 else 0
     val_towns = config.val_towns or by_share

@@ -14,7 +14,7 @@ from semgrid_eval.sources.town.town import Town
 from semgrid_eval.sources.town.traffic import Snapshot
 
 _SIGHT_M = 160.0
-_BEHIND_M, _ASIDE_M, _WIDENING = 9.0, 9.0, 0.55  # what throws shadows into the picture is kept, too
+_BEHIND_M, _ASIDE_M, _WIDENING = 9.0, 9.0, 0.55  # includes what throws shadows into the picture
 
 
 class Stage:

@@ -18,7 +18,7 @@ from semgrid_eval.sources.town.streets import lay_out_streets
 from semgrid_eval.sources.town.traffic import Traffic
 
 TOWN_VERSION = 2
-"""Counts changes to how towns are built; a town of another version is built anew."""
+"""Counts changes to how towns are built; a town of another version is built again."""
 _SPEC_FILE = "town.json"
 
 
@@ -93,7 +93,7 @@ def _description(spec: TownSpec) -> dict[str, Any]:
 
 
 def _is_complete(folder: Path, spec: TownSpec) -> bool:
-    """Say whether the folder holds this town; the description is written last."""
+    """Return whether the folder holds this town; the description is written last."""
     try:
         return bool(read_json(folder / _SPEC_FILE) == _description(spec))
     except InputError:

@@ -118,5 +118,5 @@ class Traffic:
 
 
 def _wrapped(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Bring angles to -pi..pi."""
+    """Wrap angles to -pi..pi."""
     return (angle_rad + np.pi) % (2.0 * np.pi) - np.pi
