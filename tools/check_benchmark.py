@@ -21,19 +21,19 @@ from semgrid_eval.sources.town.benchmark import changed_versions, config_of
 from semgrid_eval.sources.town.recordings import RecordingPlan, plan_recordings, render_recording
 
 
-def differing(size: SizeName, cache: Path, count: int) -> list[str]:
-    """Render `count` recordings spread over a size of town-v1; return split and name of those that differ."""
+def rendered(size: SizeName, cache: Path, count: int) -> dict[str, tuple[str, str]]:
+    """Render `count` recordings spread over a size of town-v1; return what is found and published by split and name."""
     benchmark, workers = load_benchmark("town-v1"), available_cores()
-    chosen = benchmark.sizes[size]
-    plans = plan_recordings(config_of(benchmark, size), cache, silent, workers=workers, dataset=benchmark.dataset(size))
+    config, dataset = config_of(benchmark, size), benchmark.dataset(size)
+    plans = plan_recordings(config, cache, silent, workers=workers, dataset=dataset)
     by_label = {f"{plan.split}/{plan.name}": plan for plan in plans}
-    published = dict(zip(sorted(by_label), (chosen.fingerprints or "").split(), strict=True))
+    published = dict(zip(sorted(by_label), (benchmark.sizes[size].fingerprints or "").split(), strict=True))
     some = _spread(sorted(by_label), count)
     with tempfile.TemporaryDirectory() as folder:
-        executor = local_executor(workers)
-        found = dict(executor.run(partial(_fingerprint, folder=Path(folder)), [by_label[label] for label in some]))
+        work = partial(_fingerprint, folder=Path(folder))
+        found = dict(local_executor(workers).run(work, [by_label[label] for label in some]))
     short = short_fingerprints({some[index]: str(outcome) for index, outcome in found.items()})
-    return [label for label in some if short[label] != published[label]]
+    return {label: (short[label], published[label]) for label in some}
 
 
 def _spread(labels: Sequence[str], count: int) -> list[str]:
@@ -55,12 +55,11 @@ if __name__ == "__main__":
     parser.add_argument("--recordings", type=int, default=30)
     given = parser.parse_args()
     try:
-        others = differing(given.size, given.cache, given.recordings)
+        found = rendered(given.size, given.cache, given.recordings)
     except SemgridError as error:
         raise SystemExit(f"Error: {error}") from None
-    for label in others:
-        print(f"{label} differs")
-    print(f"town-v1 {given.size}: {given.recordings - len(others)} of {given.recordings} as published")
-    changed = changed_versions(load_benchmark("town-v1").sizes[given.size].versions)
-    print("".join(f"published were made with {what} {a}, here {b}\n" for what, (a, b) in changed.items()), end="")
-    raise SystemExit(1 if others else 0)
+    for label, (here, published) in found.items():
+        print(label, here, "as published" if here == published else f"differs from the published {published}")
+    for what, (theirs, ours) in changed_versions(load_benchmark("town-v1").sizes[given.size].versions).items():
+        print(f"published were made with {what} {theirs}, here {ours}")
+    raise SystemExit(any(here != published for here, published in found.values()))
