@@ -1,6 +1,6 @@
 """Grids of whole recordings: read a log once, make the grids of every sensor, keep them by digest."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, islice
@@ -15,7 +15,7 @@ from semgrid_eval.executors import Executor, InProcess, WorkerDied
 from semgrid_eval.files import digest_value
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.actors import TrueActors
-from semgrid_eval.grids.rasterise import Counts, count_points, rasterise
+from semgrid_eval.grids.rasterise import Cells, add_points, no_points, rasterise
 from semgrid_eval.grids.recording import FORMAT_VERSION, GridRecording, read_recordings, write_recordings
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import LogReader
@@ -24,6 +24,7 @@ from semgrid_eval.progress import Progress, silent
 from semgrid_eval.sensors.kinds import read_points
 from semgrid_eval.sensors.sensor import Points
 from semgrid_eval.sensors.together import Sight, see_together
+
 
 @dataclass
 class GridDataSet:
@@ -93,7 +94,7 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
         motion, truth = EgoMotion(reader.motion(), config.integrator), TrueActors(reader, config.spec)
         observations = read_points(reader, config.sensors, config.class_by_label())
         sights = see_together(observations, config.sensors, config.target[0])
-        stretches = []
+        stretches: list[_StretchArrays] = []
         for first in sights:
             stretch = _Stretch(motion, config)
             for sight in chain([first], islice(sights, config.stretch_frames - 1)):
@@ -111,7 +112,7 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
                 split=reader.scene.split,
                 dataset=reader.scene.dataset,
                 group=getattr(reader.scene, "group", ""),
-                sensors=_rows(config),
+                sensors=tuple(config.rows),
                 target=config.target_row,
                 **arrays,
             )
@@ -134,7 +135,7 @@ class _Stretch:
         self._motion, self._config = motion, config
         self._stamps_ns: list[int] = []
         self._places: list[SE2] = []
-        self._grids: list[NDArray[np.uint8]] = []
+        self._grids: list[Cells] = []
 
     def __len__(self) -> int:
         return len(self._stamps_ns)
@@ -144,13 +145,8 @@ class _Stretch:
         self._stamps_ns.append(sight.stamp_ns)
         here = self._first_from_vehicle(sight.stamp_ns)
         self._places.append(here)
-        counts = {name: self._counts(points, here) for name, points in sight.points.items()}
-        if len(self._config.target) > 1:
-            counts[self._config.target_row] = sum(counts[name] for name in self._config.target if name in counts)
-        spec, morphology = self._config.spec, self._config.morphology
-        nothing = np.zeros((spec.rows, spec.columns), np.uint8)
-        rows = _rows(self._config)
-        self._grids.append(np.stack([rasterise(counts[n], morphology) if n in counts else nothing for n in rows]))
+        rows = [[sight.points[name] for name in names if name in sight.points] for names in self._config.rows.values()]
+        self._grids.append(np.stack([self._grid(seen, here) for seen in rows]))
 
     def arrays(self, truth: TrueActors) -> _StretchArrays:
         """Return the arrays of a `GridRecording`."""
@@ -163,21 +159,19 @@ class _Stretch:
             actors=truth.flags(stamps_ns, yaw_rad),
         )
 
-    def _counts(self, points: Points, here: SE2) -> Counts:
-        there = self._first_from_vehicle(points.stamp_ns)
-        # Nothing is added where both times are the same: those points are turned alone.
-        grid_from_points = SE2(there.x_m - here.x_m, there.y_m - here.y_m, there.yaw_rad)
-        return count_points(points, grid_from_points, self._config.spec)
+    def _grid(self, seen: Iterable[Points], here: SE2) -> Cells:
+        counts = no_points(self._config.spec)
+        for points in seen:
+            there = self._first_from_vehicle(points.stamp_ns)
+            # Where both times are the same, points are turned alone.
+            grid_from_points = SE2(there.x_m - here.x_m, there.y_m - here.y_m, there.yaw_rad)
+            add_points(counts, points, grid_from_points, self._config.spec)
+        return rasterise(counts, self._config.morphology)
 
     def _first_from_vehicle(self, stamp_ns: int) -> SE2:
         self._motion.check_cover(stamp_ns)
         there = self._motion.odom_from_vehicle(stamp_ns)
         return there.seen_from(self._motion.odom_from_vehicle(self._stamps_ns[0]))
-
-
-def _rows(config: GridConfig) -> tuple[str, ...]:
-    """Return what there are grids of: all sensors and, where it is none of them, the target."""
-    return tuple(dict.fromkeys([*config.sensors, config.target_row]))
 
 
 def _build_and_keep(log: Path, folder: Path, config: GridConfig) -> str | None:

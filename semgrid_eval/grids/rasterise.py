@@ -28,16 +28,21 @@ the opening removes what is half as wide. So grids of different cell sizes are f
 _PRIORITIES = priorities()
 
 
-def count_points(points: Points, grid_from_points: SE2, spec: GridSpec) -> Counts:
-    """Move points into the grid (T1) and count them by class and cell: -> (C, rows, columns).
+def no_points(spec: GridSpec) -> Counts:
+    """Return counts (C, rows, columns) of no point, to add some to."""
+    return np.zeros((CLASS_COUNT, spec.rows, spec.columns), np.int32)
+
+
+def add_points(counts: Counts, points: Points, grid_from_points: SE2, spec: GridSpec) -> None:
+    """Move points into the grid (T1) and add them to the counts (C, rows, columns) of their classes and cells.
 
     Args:
+        counts: of points by class and cell.
         points: of one sensor.
         grid_from_points: from the vehicle frame at the points' time to the grid's axes around the vehicle: the turn by
             its heading, and the way driven since.
         spec: extent of the grid.
     """
-    counts = np.zeros((CLASS_COUNT, spec.rows, spec.columns), np.int32)
     move = grid_from_points
     _count(
         np.atleast_2d(points.forward_m),
@@ -47,7 +52,6 @@ def count_points(points: Points, grid_from_points: SE2, spec: GridSpec) -> Count
         (spec.cell_m, spec.agent_row, spec.agent_column),
         counts,
     )
-    return counts
 
 
 def rasterise(counts: Counts, morphology: Morphology = "minkowski") -> Cells:

@@ -78,9 +78,9 @@ class GridConfig(Config):
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
-        for name in self.target:
-            if name not in self.sensors:
-                raise ValueError(f"target: {name!r} is not one of the sensors {', '.join(self.sensors)}")
+        for sensor in self.target:
+            if sensor not in self.sensors:
+                raise ValueError(f"target: {sensor!r} is not one of the sensors {', '.join(self.sensors)}")
         if len(set(self.target)) < len(self.target):
             raise ValueError("target: a sensor repeats")
         for label, name in self.class_map.items():
@@ -94,6 +94,14 @@ class GridConfig(Config):
     def target_row(self) -> str:
         """What the grids of the target are called: by its sensor, or by its sensors, joined."""
         return "+".join(self.target)
+
+    @property
+    def rows(self) -> dict[str, tuple[str, ...]]:
+        """What there are grids of, each with the sensors whose points are counted together.
+
+        These are the sensors one by one and, where several make it, the target.
+        """
+        return {**{name: (name,) for name in self.sensors}, self.target_row: self.target}
 
     @property
     def camera(self) -> CameraSensor | None:

@@ -162,9 +162,7 @@ def transforms_message(
     ]
     for camera, calibration in sorted(calibrations.items()):
         place = (calibration.x_m, calibration.y_m, calibration.z_m)
-        transforms.append(
-            _transform(time, BASE_FRAME, optical_frame(camera), place, _optical_rotation(calibration))
-        )
+        transforms.append(_transform(time, BASE_FRAME, optical_frame(camera), place, _optical_rotation(calibration)))
     return FrameTransforms(transforms=transforms)
 
 

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from semgrid_eval.errors import LogError
+from semgrid_eval.log.topics import DISPARITY, camera_topic
+from semgrid_eval.motion import EgoMotion, Integrator, Pose
 from semgrid_eval.sensors.sensor import Points, SensorConfig
 
 if TYPE_CHECKING:
@@ -85,6 +87,17 @@ def read_cameras(
     return heapq.merge(*streams, key=lambda points: points.stamp_ns)
 
 
+def frame_poses(log: "LogReader", sensor: CameraSensor, integrator: Integrator) -> list[Pose]:
+    """Return the vehicle's pose in the odom frame at each of the camera's frames.
+
+    Raises:
+        LogError: there is no such camera, or what is read is damaged.
+    """
+    topic = camera_topic(log.choose_camera(sensor.camera), DISPARITY)
+    motion = EgoMotion(log.motion(), integrator)
+    return [motion.pose_at(stamp_ns) for _, stamp_ns, _ in log.messages([topic])]
+
+
 def _read_camera(
     log: "LogReader", camera: str, sensors: Mapping[str, CameraSensor], class_by_label: NDArray[np.uint8]
 ) -> Iterator[Points]:
@@ -99,8 +112,8 @@ def _read_camera(
         seen = {size_px: projection.points(disparity, label) for size_px, projection in projections.items()}
         for name, sensor in sensors.items():
             top, bottom, left, right = sensor.crop_px
-            parts = (whole[top:bottom, left:right] for whole in seen[sensor.image_size_px])
-            yield Points(name, frame.stamp_ns, *parts)
+            pixels, part = seen[sensor.image_size_px], np.s_[top:bottom, left:right]
+            yield Points(name, frame.stamp_ns, pixels.forward_m[part], pixels.left_m[part], pixels.class_id[part])
 
 
 def _label_png(frame: "CameraFrame") -> bytes:

@@ -1,5 +1,7 @@
 """Camera geometry: from pixels with disparity to points in the vehicle frame (paper, eq. 2; readings 14 and 15)."""
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +11,16 @@ from semgrid_eval.recording.types import CameraCalibration
 
 Floats = NDArray[np.float64]
 Ids = NDArray[np.uint8]
+Image = NDArray[np.uint8] | NDArray[np.uint16]
 _Sides = tuple[NDArray[np.intp], NDArray[np.intp]]
+
+
+class Pixels(NamedTuple):
+    """The points of an image's pixels, metres forward and left in the vehicle frame and grid classes, all (H, W)."""
+
+    forward_m: Floats
+    left_m: Floats
+    class_id: Ids
 
 
 class Projection:
@@ -27,11 +38,11 @@ class Projection:
         self._origin_m = np.array([calibration.x_m, calibration.y_m])
         self._depth_disparity_m_px = calibration.fx_px * calibration.baseline_m  # at the disparity's own resolution
 
-    def points(self, disparity: NDArray[np.uint16], label: Ids) -> tuple[Floats, Floats, Ids]:
-        """Project source images (h, w): -> metres forward and left in the vehicle frame and grid classes, all (H, W).
+    def points(self, disparity: Image, label: Image) -> Pixels:
+        """Project source images (h, w).
 
         Args:
-            disparity: d_px = (p - 1) / 256; 0 is invalid, 1 at infinity.
+            disparity: 16 bit, d_px = (p - 1) / 256; 0 is invalid, 1 at infinity.
             label: label ids.
         """
         width, height = self._size_px
@@ -44,7 +55,7 @@ class Projection:
             (self._slope(disparity.shape), self._origin_m, self._depth_disparity_m_px),
             (forward_m, left_m, class_id),
         )
-        return forward_m, left_m, class_id
+        return Pixels(forward_m, left_m, class_id)
 
     def _sides(self, shape: tuple[int, ...]) -> _Sides:
         width, height = self._size_px

@@ -22,9 +22,7 @@ class Sight:
     points: Mapping[str, Points]
 
 
-def see_together(
-    observations: Iterable[Points], sensors: Mapping[str, SensorConfig], leader: str
-) -> Iterator[Sight]:
+def see_together(observations: Iterable[Points], sensors: Mapping[str, SensorConfig], leader: str) -> Iterator[Sight]:
     """Iterate over the times of the leading sensor with the newest observation that each sensor had made by then.
 
     Args:

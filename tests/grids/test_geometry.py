@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.cameras import calibration, slow_point
-
 from semgrid_eval.grids.geometry import ego_from_camera, ground_rays, nearest_indices
+from support.cameras import calibration, slow_point
 
 angle = st.floats(-0.5, 0.5)
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from semgrid_eval.grids.motion import integrate_motion
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.grids.motion import integrate_motion
 from semgrid_eval.recording.types import MotionSample
 
 

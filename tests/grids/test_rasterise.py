@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import ndimage
+from semgrid_eval.grids.geometry import ground_rays
 from support.cameras import calibration, slow_point
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, CLASSES, NO_POINT
-from semgrid_eval.grids.geometry import ground_rays
 from semgrid_eval.grids.rasterise import LabelledImage, count_points, rasterise
 from semgrid_eval.grids.spec import GridSpec
 

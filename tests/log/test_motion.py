@@ -1,8 +1,8 @@
 import math
 
 import pytest
-
 from semgrid_eval.log.motion import DeadReckoning
+
 from semgrid_eval.recording.types import MotionSample, Pose
 
 S = 1_000_000_000

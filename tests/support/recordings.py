@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.grids.build import GridRecording
+from semgrid_eval.grids.recording import GridRecording
 
 FRAME_NS = 58_823_529
 

@@ -3,11 +3,11 @@ import dataclasses
 import cv2
 import numpy as np
 import pytest
+from semgrid_eval.grids.geometry import unit_projection
 from support.toy_world import street
 
 from semgrid_eval.arrays import read_arrays
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.grids.geometry import unit_projection
 from semgrid_eval.grids.spec import GridConfig, Sensor
 from semgrid_eval.report.examples.blind import blind_cells
 from semgrid_eval.report.examples.kept import Glimpses

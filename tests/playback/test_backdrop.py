@@ -1,12 +1,12 @@
 import pytest
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from semgrid_eval.playback.drive import Drive
 from support.driving import FRAME_NS, START_NS, driving
 
 from semgrid_eval.errors import LogError
 from semgrid_eval.log.codec import stamp_ns
 from semgrid_eval.log.store import LogReader, write_log
 from semgrid_eval.log.topics import TRANSFORMS
-from semgrid_eval.playback.drive import Drive
 
 
 @pytest.fixture
