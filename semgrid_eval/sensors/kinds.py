@@ -1,6 +1,7 @@
 """The kinds of sensors: who adds one adds its line to `KINDS`."""
 
 import heapq
+import json
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, SerializeAsAny, StringConstraints
 
-from semgrid_eval.config import parse_config
-from semgrid_eval.errors import ConfigError
 from semgrid_eval.sensors.camera import CameraSensor, read_cameras
 from semgrid_eval.sensors.sensor import Kind, Points, SensorConfig
 
@@ -25,12 +24,12 @@ def _of_its_kind(value: object) -> object:
     if not isinstance(value, Mapping):
         return value
     kind = value.get("kind", _DEFAULT_KIND)
-    if kind not in KINDS:
+    if kind not in tuple(KINDS):
         raise ValueError(f"kind {kind!r} is not one of {', '.join(KINDS)}")
-    try:
-        return parse_config(KINDS[kind].config, value)
-    except ConfigError as error:
-        raise ValueError(str(error)) from None
+    config = KINDS[kind].config
+    if unknown := [key for key in value if key not in config.model_fields]:
+        raise ValueError(f"unknown key {unknown[0]!r}; allowed here: {', '.join(sorted(config.model_fields))}")
+    return config.model_validate_json(json.dumps(value, default=str))
 
 
 SensorName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}$")]

@@ -26,6 +26,7 @@ def recording(
         dataset="synthetic",
         split="train",
         sensors=sensors,
+        target="full",
         stamps_ns=np.arange(frames, dtype=np.int64) * FRAME_NS,
         grids=grids,
         position_m=np.zeros((frames, 2)) if position_m is None else np.asarray(position_m, np.float64),
