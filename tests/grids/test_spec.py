@@ -89,7 +89,10 @@ def test_a_point_at_a_cells_centre_is_drawn_in_that_cell(spec):
         ({"sensors": {"full": {"image_size_px": [4, 4]}}}, "sensors.full: .*outside 16 to 8192"),
         ({"sensors": {"full": {"bottom_px": 300}}}, "sensors.full: .*reaches beyond the image"),
         ({"sensors": {"full": {"bottom_px": 30, "top_px": 30}}}, "sensors.full: .*covers no pixel"),
-        ({"sensors": {"full": {"top": 30}}}, "sensors.full: unknown key 'top'; allowed here: bottom_px, camera, .*top_px"),
+        (
+            {"sensors": {"full": {"top": 30}}},
+            "sensors.full: unknown key 'top'; allowed here: bottom_px, camera, .*top_px",
+        ),
         ({"sensors": {"full": {"kind": "sonar"}}}, "sensors.full: kind 'sonar' is not one of camera"),
         ({"sensors": {"full": {"kind": ["camera"]}}}, "sensors.full: kind .* is not one of camera"),
         ({"sensors": {"full": {"bottom_px": "3"}}}, "sensors.full.bottom_px: .*found '3'"),

@@ -22,7 +22,7 @@ class Radar(SensorConfig):
     """Sees two persons abreast at one distance, 20 ms before each frame."""
 
     kind: Literal["radar"] = "radar"
-    ahead_m: float = 10.0
+    ahead_m: float = 10.2
 
 
 def read_radar(log, sensors, class_by_label):
@@ -31,7 +31,11 @@ def read_radar(log, sensors, class_by_label):
         for name, sensor in sensors.items():
             classes = np.array([PERSON, PERSON, NO_POINT], np.uint8)
             yield Points(
-                name, START_NS + frame * FRAME_NS - 20_000_000, np.full(3, sensor.ahead_m), np.arange(-1.0, 2.0), classes
+                name,
+                START_NS + frame * FRAME_NS - 20_000_000,
+                np.full(3, sensor.ahead_m),
+                np.arange(-1.0, 2.0),
+                classes,
             )
 
 
@@ -43,7 +47,7 @@ def radar(monkeypatch):
 def test_its_grids_stand_beside_a_cameras_moved_to_the_time_of_the_target(tmp_path):
     write_log(street(1, frames=3, speed_mps=10.0).recording(), tmp_path / "toy.mcap")
     value = {
-        "sensors": {"full": {}, "near": {"kind": "radar"}, "far": {"kind": "radar", "ahead_m": 30.1}},
+        "sensors": {"full": {}, "near": {"kind": "radar"}, "far": {"kind": "radar", "ahead_m": 30.5}},
         "morphology": "off",
     }
     config = parse_config(GridConfig, value)
@@ -51,7 +55,7 @@ def test_its_grids_stand_beside_a_cameras_moved_to_the_time_of_the_target(tmp_pa
     assert recording.sensors == ("full", "near", "far")
     assert recording.target == "full"
     cell_m = config.spec.cell_m
-    for row, ahead_m in ((1, 10.0), (2, 30.1)):
+    for row, ahead_m in ((1, 10.2), (2, 30.5)):
         for frame in range(3):
             cells = np.argwhere(recording.grids[row, frame] != UNKNOWN)
             assert cells[:, 0].tolist() == [127 - int((ahead_m - 0.2) / cell_m)] * 2, "0.2 m nearer after 20 ms"

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.cameras import calibration, slow_point
+
 from semgrid_eval.classes import NO_POINT
 from semgrid_eval.sensors.projection import Projection, ground_slope, nearest_indices, unit_projection
-from support.cameras import calibration, slow_point
 
 angle = st.floats(-0.5, 0.5)
 

@@ -1,3 +1,5 @@
+from itertools import chain
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ def seen(name, *times_ms):
 
 def together(*observations, max_age_s=0.1):
     sensors = {name: SensorConfig(kind="any", max_age_s=max_age_s) for name in ("a", "b", "c")}
-    merged = sorted(sum(observations, []), key=lambda points: points.stamp_ns)
+    merged = sorted(chain(*observations), key=lambda points: points.stamp_ns)
     sights = see_together(merged, sensors, "a")
     return [(s.stamp_ns // MS, {name: points.stamp_ns / MS for name, points in s.points.items()}) for s in sights]
 

@@ -20,7 +20,7 @@ POLES = [Box("pole", x, x + 0.3, 9.0, 9.3, 3.0) for x in range(2, 30, 3)]
 
 def built(folder, *, target=("front",), max_age_s=0.2):
     cameras = {"front": Mount(), "left": Mount(1.3, LATE_NS)}
-    world = ToyWorld(POLES, speed_mps=14.0, yaw_rate_radps=0.2, frames=8, cameras=cameras)
+    world = ToyWorld(POLES, speed_mps=14.0, yaw_rate_radps=0.7, frames=8, cameras=cameras)
     write_log(world.recording(), folder / "toy.mcap")
     sensors = {name: CameraSensor(camera=name, max_age_s=max_age_s) for name in cameras}
     config = GridConfig(spec=SPEC, sensors=sensors, target=target, integrator="arc", morphology="off")
@@ -43,7 +43,7 @@ def test_poles_stand_where_they_are_at_the_time_of_the_grid(tmp_path, row, name)
     for frame in range(1, 8):
         x_m, y_m, yaw_rad = world.pose_at(frame * FRAME_NS)
         assert recording.yaw_rad[frame] == pytest.approx(yaw_rad)
-        places_m = pole_places_m(recording.grids[row, frame]) + (x_m, y_m)
+        places_m = np.add(pole_places_m(recording.grids[row, frame]), (x_m, y_m))
         found += len(places_m)
         for place_m in places_m:
             away_m = min(math.hypot(*(place_m - ((pole.x0 + pole.x1) / 2, 9.15))) for pole in POLES)

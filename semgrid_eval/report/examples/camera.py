@@ -67,8 +67,9 @@ class View:
         """The parts of the shown image that the sensors see, none for the whole image."""
         if self.grid is None:
             return ()
-        parts = {name: part for name, part in parts_of_shown(self.grid).items() if name in self.sensors}
-        return tuple(_crop(name, part) for name, part in parts.items() if not part.is_whole_image)
+        parts = parts_of_shown(self.grid)
+        seen = [name for name in self.sensors if name in parts and not parts[name].is_whole_image]
+        return tuple(_crop(name, parts[name]) for name in seen)
 
     @property
     def hatching(self) -> str:
