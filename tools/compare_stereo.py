@@ -22,12 +22,14 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, LABEL_ID, UNKNOWN
 from semgrid_eval.errors import SemgridError
-from semgrid_eval.grids.build import GridRecording, build_log
+from semgrid_eval.grids.build import build_log
+from semgrid_eval.grids.recording import GridRecording
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import LogReader, find_logs
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.recording.types import CameraFrame
-from semgrid_eval.windows.data import shift_grids, shift_in_cells
+from semgrid_eval.sensors.camera import CameraSensor
+from semgrid_eval.windows.shift import shift_grids, shift_in_cells
 
 RANGES_M = ((0, 10), (10, 20), (20, 30), (30, 40), (40, 60))
 STEP_S = 0.3
@@ -202,7 +204,7 @@ def _share_off(values: Floats) -> float:
 
 def _measure_grids(logs: list[Path], count: int) -> NDArray[np.int64]:
     """Count cells (ranges, newer class, older class there) but those that are known in the older grid alone."""
-    config = GridConfig(sensors=())
+    config = GridConfig(sensors={"full": CameraSensor()})
     spec = config.spec
     rows, columns = np.indices((spec.rows, spec.columns))
     range_m = np.hypot((spec.agent_row - rows - 0.5) * spec.cell_m, (spec.agent_column - columns - 0.5) * spec.cell_m)

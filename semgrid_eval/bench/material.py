@@ -9,7 +9,7 @@ import numpy as np
 
 from semgrid_eval.bench.measurement import Settings
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.grids.build import GridRecording
+from semgrid_eval.grids.recording import GridRecording
 from semgrid_eval.log.store import write_log
 from semgrid_eval.progress import silent
 from semgrid_eval.recording.types import Recording
@@ -94,6 +94,7 @@ def _random_recording(name: str, random: np.random.Generator) -> GridRecording:
         split="train",
         dataset="random",
         sensors=("full",),
+        target="full",
         stamps_ns=np.arange(_FRAMES, dtype=np.int64) * _FRAME_NS,
         grids=coarse.repeat(_COARSE, axis=2).repeat(_COARSE, axis=3),
         position_m=np.cumsum(random.normal(0.3, 0.1, (_FRAMES, 2)), axis=0),

@@ -13,8 +13,11 @@ from semgrid_eval.log.topics import TRUE_ACTORS
 from semgrid_eval.recording.types import Actor, Pose
 
 MOVING_FROM_MPS = 0.5
-MARGIN_CELLS = 1
-"""Footprints grow by this much on each side, since the noise of depth smears what a sensor sees of an actor."""
+MARGIN_M = 100.0 / 128.0
+"""Footprints grow by this much on each side, since the noise of depth smears what a sensor sees of an actor.
+
+It is one cell of the paper's grid, and as many metres on every other one.
+"""
 
 Flags = NDArray[np.uint8]
 Floats = NDArray[np.float64]
@@ -89,7 +92,7 @@ def draw_boxes(boxes: Floats, spec: GridSpec) -> Flags:
     bits = np.where(boxes[:, 5] >= MOVING_FROM_MPS, MOVING, STANDING).astype(np.uint8)
     # In cells from the corner that is the vehicle's origin, along the axes of rows and columns.
     cells = boxes[:, :5] / np.array([spec.cell_m, spec.cell_m, 1.0, 2 * spec.cell_m, 2 * spec.cell_m])
-    cells[:, 3:] += MARGIN_CELLS
+    cells[:, 3:] += MARGIN_M / spec.cell_m
     _draw(cells, bits, spec.agent_row, spec.agent_column, flags)
     return flags
 

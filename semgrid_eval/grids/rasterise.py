@@ -1,6 +1,6 @@
 """Discretisation D: labelled points to cells by priority, and class-wise morphology (readings 12 and 13)."""
 
-from dataclasses import dataclass
+import math
 from typing import Literal
 
 import cv2
@@ -9,61 +9,49 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASSES, NO_POINT, UNKNOWN, Category, priorities
-from semgrid_eval.grids.geometry import GroundRays
+from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.spec import GridSpec
+from semgrid_eval.sensors.sensor import Points
 
 Cells = NDArray[np.uint8]
 Counts = NDArray[np.int32]
 Morphology = Literal["minkowski", "opencv", "off"]
 
-STATIC_KERNELS = (3, 2, 4, 4)
-OTHER_KERNELS = (1, 1, 2, 2)
-"""Sizes of dilation, erosion, erosion, dilation (supplement, "semantic grid generation")."""
+STATIC_KERNELS_CELLS = (3, 2, 4, 4)
+OTHER_KERNELS_CELLS = (1, 1, 2, 2)
+"""Sides of dilation, erosion, erosion, dilation in cells (supplement, "semantic grid generation").
+
+They are cells at every size of cell: on a grid of half the cell size the closing bridges gaps of half the length, and
+the opening removes what is half as wide. So grids of different cell sizes are filtered differently in metres.
+"""
 
 _PRIORITIES = priorities()
 
 
-@dataclass(frozen=True)
-class LabelledImage:
-    """What one frame contributes: grid classes and disparity at the resized resolution.
+def no_points(spec: GridSpec) -> Counts:
+    """Return counts (C, rows, columns) of no point, to add some to."""
+    return np.zeros((CLASS_COUNT, spec.rows, spec.columns), np.int32)
+
+
+def add_points(counts: Counts, points: Points, grid_from_points: SE2, spec: GridSpec) -> None:
+    """Move points into the grid (T1) and add them to the counts (C, rows, columns) of their classes and cells.
 
     Args:
-        classes: (H, W) uint8 grid class ids, `NO_POINT` where there is no point.
-        disparity: (H, W) uint16, d_px = (p - 1) / 256, 0 invalid.
-    """
-
-    classes: Cells
-    disparity: NDArray[np.uint16]
-
-
-def count_points(
-    image: LabelledImage, rays: GroundRays, yaw_rad: float, crops: NDArray[np.int64], spec: GridSpec
-) -> Counts:
-    """Project all pixels (P), turn them by the vehicle's heading (T1) and count them by sensor, class and cell.
-
-    Args:
-        image: labels and disparity.
-        rays: of the same camera and size.
-        yaw_rad: heading of the vehicle in the orientation of the grid, left-positive.
-        crops: (S, 4) top, bottom, left, right of each sensor in pixels, end exclusive.
+        counts: of points by class and cell.
+        points: of one sensor.
+        grid_from_points: from the vehicle frame at the points' time to the grid's axes around the vehicle: the turn by
+            its heading, and the way driven since.
         spec: extent of the grid.
-
-    Returns:
-        (S, C, rows, columns) number of points.
     """
-    counts = np.zeros((len(crops), CLASS_COUNT, spec.rows, spec.columns), np.int32)
+    move = grid_from_points
     _count(
-        image.classes,
-        image.disparity,
-        rays.slope,
-        rays.origin_m,
-        rays.depth_disparity_m_px,
-        np.array([np.cos(yaw_rad), np.sin(yaw_rad)]),
-        crops,
+        np.atleast_2d(points.forward_m),
+        np.atleast_2d(points.left_m),
+        np.atleast_2d(points.class_id),
+        (math.cos(move.yaw_rad), math.sin(move.yaw_rad), move.x_m, move.y_m),
         (spec.cell_m, spec.agent_row, spec.agent_column),
         counts,
     )
-    return counts
 
 
 def rasterise(counts: Counts, morphology: Morphology = "minkowski") -> Cells:
@@ -84,7 +72,7 @@ def rasterise(counts: Counts, morphology: Morphology = "minkowski") -> Cells:
 
 
 def _filter_class(layer: Cells, class_id: int, morphology: Morphology) -> NDArray[np.bool_]:
-    sizes = STATIC_KERNELS if CLASSES[class_id].category is Category.STATIC else OTHER_KERNELS
+    sizes = STATIC_KERNELS_CELLS if CLASSES[class_id].category is Category.STATIC else OTHER_KERNELS_CELLS
     for operation, size in zip((cv2.dilate, cv2.erode, cv2.erode, cv2.dilate), sizes, strict=True):
         if size == 1:
             continue
@@ -96,25 +84,21 @@ def _filter_class(layer: Cells, class_id: int, morphology: Morphology) -> NDArra
 
 
 @numba.njit(cache=True, nogil=True)
-def _count(classes, disparity, slope, origin_m, depth_disparity, heading, crops, extent, counts):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+def _count(forward_m, left_m, class_id, move, extent, counts):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    cosine, sine, way_forward_m, way_left_m = move
     cell_m, agent_row, agent_column = extent
-    rows, columns = counts.shape[2], counts.shape[3]
-    for v in range(classes.shape[0]):
-        for u in range(classes.shape[1]):
-            label = classes[v, u]
-            value = disparity[v, u]
-            if label == NO_POINT or value <= 1:  # 0 is invalid, 1 is at infinity
+    rows, columns = counts.shape[1], counts.shape[2]
+    for v in range(class_id.shape[0]):
+        for u in range(class_id.shape[1]):
+            label = class_id[v, u]
+            if label == NO_POINT:
                 continue
-            depth_m = depth_disparity * 256.0 / (value - 1.0)
-            forward_m = origin_m[0] + depth_m * slope[0, v, u]
-            left_m = origin_m[1] + depth_m * slope[1, v, u]
-            row = agent_row - 1 - np.floor((heading[0] * forward_m - heading[1] * left_m) / cell_m)
-            column = agent_column - 1 - np.floor((heading[1] * forward_m + heading[0] * left_m) / cell_m)
-            if row < 0 or row >= rows or column < 0 or column >= columns:
-                continue
-            for s in range(crops.shape[0]):
-                if crops[s, 0] <= v < crops[s, 1] and crops[s, 2] <= u < crops[s, 3]:
-                    counts[s, label, int(row), int(column)] += 1
+            ahead_m = cosine * forward_m[v, u] - sine * left_m[v, u] + way_forward_m
+            aside_m = sine * forward_m[v, u] + cosine * left_m[v, u] + way_left_m
+            row = agent_row - 1 - np.floor(ahead_m / cell_m)
+            column = agent_column - 1 - np.floor(aside_m / cell_m)
+            if 0 <= row < rows and 0 <= column < columns:
+                counts[label, int(row), int(column)] += 1
 
 
 @numba.njit(cache=True, nogil=True)

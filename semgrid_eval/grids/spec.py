@@ -8,8 +8,11 @@ from pydantic import Field, model_validator
 
 from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, NO_POINT, class_map
 from semgrid_eval.config import Config
+from semgrid_eval.motion import Integrator
+from semgrid_eval.sensors.camera import CameraSensor
+from semgrid_eval.sensors.kinds import Sensor, SensorName
+from semgrid_eval.sensors.sensor import SensorConfig
 
-TARGET_SENSOR = "full"
 STANDING, MOVING = 1, 2
 """Bits of the flags that say whose footprint a cell lies in."""
 
@@ -41,20 +44,15 @@ class GridSpec(Config):
         return forward_m, left_m
 
 
-class Sensor(Config):
-    """A rectangle of the camera image that acts as a sensor of its own; pixels of the resized image, end exclusive."""
-
-    name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")
-    top_px: int = Field(0, ge=0)
-    bottom_px: int
-    left_px: int = Field(0, ge=0)
-    right_px: int
-
-    @model_validator(mode="after")
-    def _not_empty(self) -> Self:
-        if self.bottom_px <= self.top_px or self.right_px <= self.left_px:
-            raise ValueError(f"sensor {self.name} covers no pixel")
-        return self
+def paper_sensors() -> dict[str, SensorConfig]:
+    """Return the whole image and the sensors of Split 1 and Split 2 (supplement; reading 19), of 512 x 256 px."""
+    return {
+        "full": CameraSensor(),
+        "split1_upper": CameraSensor(bottom_px=130),
+        "split1_lower": CameraSensor(top_px=130),
+        "split2_upper": CameraSensor(bottom_px=125, left_px=40, right_px=472),
+        "split2_lower": CameraSensor(top_px=145, left_px=40, right_px=472),
+    }
 
 
 class GridConfig(Config):
@@ -62,10 +60,8 @@ class GridConfig(Config):
 
     Args:
         spec: extent of the grids.
-        image_size_px: width and height to which labels and disparity are brought before projection (reading 22).
-        camera: name of the camera; None takes a log's only one.
-        sensors: crops of the image; None takes the paper's Split 1 and Split 2 by `y_axis`.
-        y_axis: where the supplement's rows are counted from, the top (down) or the bottom (up) (reading 19).
+        sensors: settings by name; a `kind` is a camera where it is left out.
+        target: the sensors whose points, counted together, make the targets. The times of the first are the grids'.
         integrator: of the egomotion; euler as the paper, arc for constant turn and speed between samples (reading 17).
         morphology: reading 12.
         stretch_frames: length of a recording; longer logs are cut (reading 18).
@@ -73,32 +69,51 @@ class GridConfig(Config):
     """
 
     spec: GridSpec = GridSpec()
-    image_size_px: tuple[int, int] = (512, 256)
-    camera: str | None = None
-    sensors: tuple[Sensor, ...] | None = None
-    y_axis: Literal["down", "up"] = "down"
-    integrator: Literal["euler", "arc"] = "euler"
+    sensors: dict[SensorName, Sensor] = Field(default_factory=paper_sensors)
+    target: tuple[str, ...] = Field(("full",), min_length=1)
+    integrator: Integrator = "euler"
     morphology: Literal["minkowski", "opencv", "off"] = "minkowski"
     stretch_frames: int = Field(30, ge=2, le=100_000)
     class_map: dict[str, str | None] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
-        width, height = self.image_size_px
-        if not (16 <= width <= 8192 and 16 <= height <= 8192):
-            raise ValueError(f"image_size_px {width} x {height} is outside 16 to 8192")
+        for sensor in self.target:
+            if sensor not in self.sensors:
+                raise ValueError(f"target: {sensor!r} is not one of the sensors {', '.join(self.sensors)}")
+        if len(set(self.target)) < len(self.target):
+            raise ValueError("target: a sensor repeats")
         for label, name in self.class_map.items():
             if label not in LABEL_ID:
                 raise ValueError(f"class_map: {label!r} is not a Cityscapes label")
             if name is not None and name not in CLASS_NAMES:
                 raise ValueError(f"class_map.{label}: {name!r} is not one of {', '.join(CLASS_NAMES)}")
-        names = [sensor.name for sensor in self.all_sensors()]
-        if len(set(names)) < len(names):
-            raise ValueError("sensor names repeat")
-        for sensor in self.all_sensors():
-            if sensor.bottom_px > height or sensor.right_px > width:
-                raise ValueError(f"sensor {sensor.name} reaches beyond the image of {width} x {height} px")
         return self
+
+    @property
+    def target_row(self) -> str:
+        """What the grids of the target are called: by its sensor, or by its sensors, joined."""
+        return "+".join(self.target)
+
+    @property
+    def rows(self) -> dict[str, tuple[str, ...]]:
+        """What there are grids of, each with the sensors whose points are counted together.
+
+        These are the sensors one by one and, where several make it, the target.
+        """
+        return {**{name: (name,) for name in self.sensors}, self.target_row: self.target}
+
+    @property
+    def camera(self) -> CameraSensor | None:
+        """The part of a camera's image that leads the target; None where a sensor of another kind does."""
+        first = self.sensors[self.target[0]]
+        return first if isinstance(first, CameraSensor) else None
+
+    def target_identity(self) -> dict[str, object]:
+        """Return what determines the targets alone, whatever other sensors there are and what any is called."""
+        settings = self.model_dump(mode="json")
+        sensors = [settings["sensors"][name] for name in self.target]
+        return {**settings, "sensors": sensors, "target": len(sensors)}
 
     def class_by_label(self) -> NDArray[np.uint8]:
         """Return the table (256,) from label id to grid class with this configuration's replacements (reading 21)."""
@@ -106,32 +121,3 @@ class GridConfig(Config):
         for label, name in self.class_map.items():
             table[LABEL_ID[label]] = NO_POINT if name is None else CLASS_NAMES.index(name)
         return table
-
-    def all_sensors(self) -> tuple[Sensor, ...]:
-        """Return the whole image, which gives the targets, and then the crops."""
-        width, height = self.image_size_px
-        whole = Sensor(name=TARGET_SENSOR, bottom_px=height, right_px=width)
-        return (whole, *(self.sensors if self.sensors is not None else paper_sensors(width, height, self.y_axis)))
-
-
-def paper_sensors(width: int, height: int, y_axis: Literal["down", "up"]) -> tuple[Sensor, ...]:
-    """Return the sensors of Split 1 and Split 2 (supplement; reading 19), given there for 512 x 256 px."""
-
-    def crop(name: str, first_row: int, end_row: int, margin: int) -> Sensor:
-        # Rows are those of the paper's image; "up" counts them from the bottom.
-        top, bottom = (first_row, end_row) if y_axis == "down" else (256 - end_row, 256 - first_row)
-        return Sensor(
-            name=name,
-            top_px=round(top * height / 256),
-            bottom_px=round(bottom * height / 256),
-            left_px=round(margin * width / 512),
-            right_px=round((512 - margin) * width / 512),
-        )
-
-    near, far = ("lower", "upper") if y_axis == "down" else ("upper", "lower")
-    return (
-        crop(f"split1_{far}", 0, 130, 0),
-        crop(f"split1_{near}", 130, 256, 0),
-        crop(f"split2_{far}", 0, 125, 40),
-        crop(f"split2_{near}", 145, 256, 40),
-    )

@@ -12,6 +12,7 @@ from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from semgrid_eval.geometry import optical_quaternion
 from semgrid_eval.log.schemas.actors_pb2 import Actor as ActorMessage
 from semgrid_eval.log.schemas.actors_pb2 import Actors
 from semgrid_eval.log.schemas.egomotion_pb2 import Egomotion
@@ -170,9 +171,7 @@ def transforms_message(
     ]
     for camera, calibration in sorted(calibrations.items()):
         place = (calibration.x_m, calibration.y_m, calibration.z_m)
-        transforms.append(
-            _transform(time, BASE_FRAME, optical_frame(camera), place, _ego_from_optical_rotation(calibration))
-        )
+        transforms.append(_transform(time, BASE_FRAME, optical_frame(camera), place, _optical_rotation(calibration)))
     return FrameTransforms(transforms=transforms)
 
 
@@ -198,29 +197,6 @@ def _yaw_rad(turn: Quaternion) -> float:
     return next((yaw for yaw in near if (math.sin(yaw / 2), math.cos(yaw / 2)) == (turn.z, turn.w)), found)
 
 
-def _ego_from_optical_rotation(calibration: CameraCalibration) -> Quaternion:
-    """Turn optical axes (right, down, forward) into camera axes (forward, left, up), then by roll, pitch and yaw."""
-    result = _product(_about(2, calibration.yaw_rad), _about(1, calibration.pitch_rad))
-    result = _product(result, _about(0, calibration.roll_rad))
-    x, y, z, w = _product(result, (-0.5, 0.5, -0.5, 0.5))
+def _optical_rotation(calibration: CameraCalibration) -> Quaternion:
+    x, y, z, w = optical_quaternion(calibration.roll_rad, calibration.pitch_rad, calibration.yaw_rad)
     return Quaternion(x=x, y=y, z=z, w=w)
-
-
-_Quaternion = tuple[float, float, float, float]
-
-
-def _about(axis: int, angle_rad: float) -> _Quaternion:
-    x, y, z = (math.sin(angle_rad / 2) if axis == i else 0.0 for i in range(3))
-    return x, y, z, math.cos(angle_rad / 2)
-
-
-def _product(a: _Quaternion, b: _Quaternion) -> _Quaternion:
-    """Multiply quaternions (x, y, z, w): the rotation by `b`, then by `a`."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )

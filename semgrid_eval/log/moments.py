@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError
 from semgrid_eval.log import codec, topics
-from semgrid_eval.log.motion import DeadReckoning
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.log.writer import MessageWriter
+from semgrid_eval.motion import EgoMotion
 from semgrid_eval.recording.png import read_header, with_palette
 from semgrid_eval.recording.types import Actor, CameraFrame, Moment, MotionSample, Pose, Recording
 
@@ -21,7 +21,7 @@ class MomentWriter:
     def __init__(self, writer: MessageWriter, recording: Recording) -> None:
         self._writer = writer
         self._recording = recording
-        self._reckoning = DeadReckoning()
+        self._ego_motion = EgoMotion()  # as far as it is known by each moment
         self._palette = label_palette()
         self._last_ns = -1
 
@@ -52,12 +52,12 @@ class MomentWriter:
     def _motion(self, moment: Moment) -> None:
         for sample in moment.motion:
             self._advance(sample.stamp_ns, "motion sample")
-            self._reckoning.add(sample)
+            self._ego_motion.add(sample)
             self._writer.write(topics.EGO_MOTION, codec.motion_message(sample), log_ns=sample.stamp_ns)
 
     def _vehicle(self, moment: Moment) -> None:
         now_ns = moment.stamp_ns
-        pose = self._reckoning.pose_at(now_ns)
+        pose = self._ego_motion.pose_at(now_ns)
         transforms = codec.transforms_message(pose, self._recording.calibrations)
         self._writer.write(topics.TRANSFORMS, transforms, log_ns=now_ns)
         self._writer.write(topics.EGO_POSE, codec.pose_message(pose, topics.ODOM_FRAME), log_ns=now_ns)

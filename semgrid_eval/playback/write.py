@@ -21,7 +21,7 @@ from semgrid_eval.log.codec import transforms_message
 from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, GridPlace, exact_message, viewer_message
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.log.writer import MessageWriter
-from semgrid_eval.playback.drive import Drive, Outgoing
+from semgrid_eval.playback.backdrop import Backdrop, Outgoing
 from semgrid_eval.playback.layout import prediction_topic, viewer_layout
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.recording.types import Pose
@@ -93,15 +93,15 @@ def write_playback(
         end_ns = None
         for done, name in enumerate(chosen, start=1):
             with ExitStack() as stack:
-                drive = _open_drive(record, scored, name, logs, stack) if logs is not None else None
-                track = _Track(scored, name, drive)
-                shift_ns = 0 if end_ns is None else end_ns + GAP_NS - track.first_ns
-                for sent in track.messages(shift_ns):
+                backdrop = _open_backdrop(record, scored, name, logs, stack) if logs is not None else None
+                played = _Messages(scored, name, backdrop)
+                shift_ns = 0 if end_ns is None else end_ns + GAP_NS - played.first_ns
+                for sent in played.messages(shift_ns):
                     writer.write(
                         sent.topic, sent.message, log_ns=sent.log_ns, publish_ns=sent.publish_ns, notes=sent.notes
                     )
-                cameras = cameras if drive is None else drive.cameras
-            shifts_ns[name], end_ns = shift_ns, track.last_ns + shift_ns
+                cameras = cameras if backdrop is None else backdrop.cameras
+            shifts_ns[name], end_ns = shift_ns, played.last_ns + shift_ns
             progress(done, len(chosen), name)
         writer.metadata(RECORD, _metadata(record, scored, shifts_ns))
     layout = out.with_suffix(".layout.json")
@@ -185,7 +185,7 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:_LISTED_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def _open_drive(record: RunRecord, scored: _Scored, name: str, logs: Path, stack: ExitStack) -> Drive:
+def _open_backdrop(record: RunRecord, scored: _Scored, name: str, logs: Path, stack: ExitStack) -> Backdrop:
     if not logs.is_dir():
         raise InputError("is not a folder", path=logs)
     path = scored.record.windows[scored.windows_of[name][0]].log
@@ -193,10 +193,10 @@ def _open_drive(record: RunRecord, scored: _Scored, name: str, logs: Path, stack
     known = scored_digest(record, scored.record, path)
     if log.digest not in (scored.record.log_digests if known is None else (known,)):
         raise LogError(f"has digest {log.digest}, and the log that was scored had {known or 'another'}", path=log.path)
-    return Drive(log, scored.grid.camera)
+    return Backdrop(log, scored.grid)
 
 
-class _Track:
+class _Messages:
     """The messages of one recording.
 
     Raises:
@@ -204,14 +204,14 @@ class _Track:
         ResultError: the result does not tell the times of inputs, and there is no log to look them up in.
     """
 
-    def __init__(self, scored: _Scored, name: str, drive: Drive | None) -> None:
-        self._scored, self._drive = scored, drive
+    def __init__(self, scored: _Scored, name: str, backdrop: Backdrop | None) -> None:
+        self._scored, self._backdrop = scored, backdrop
         self._indices = scored.windows_of[name]
         windows = [scored.record.windows[i] for i in self._indices]
         self._windows = windows
         self._inputs_ns = [self._input_stamps_ns(window) for window in windows]
         self.last_ns = windows[-1].target_stamp_ns
-        self.first_ns = windows[0].target_stamp_ns if drive is None else min(stamps[0] for stamps in self._inputs_ns)
+        self.first_ns = windows[0].target_stamp_ns if backdrop is None else min(stamps[0] for stamps in self._inputs_ns)
 
     def messages(self, shift_ns: int) -> Iterator[Outgoing]:
         """Iterate over all messages in the order of time, all times shifted."""
@@ -219,15 +219,15 @@ class _Track:
         return heapq.merge(around, self._grids(shift_ns), key=lambda sent: sent.log_ns)
 
     def _around(self, shift_ns: int) -> Iterator[Outgoing]:
-        if self._drive is None:  # nothing is known of the vehicle's way: each grid lies where the last one did
+        if self._backdrop is None:  # nothing is known of the vehicle's way: each grid lies where the last one did
             for window in self._windows:
                 now = Pose(window.target_stamp_ns + shift_ns, 0.0, 0.0, 0.0)
                 yield Outgoing(now.stamp_ns, topics.TRANSFORMS, transforms_message(now, {}))
             return
         # Grids have the orientation of the first frame of their stretch of the log.
-        first = self._drive.frame_at(self._windows[0].target_stamp_ns) - self._windows[0].target_frame
-        yaw_rad = self._drive.yaw_rad(first)
-        yield from self._drive.messages(self.first_ns, self.last_ns, shift_ns=shift_ns, grid_yaw_rad=yaw_rad)
+        first = self._backdrop.frame_at(self._windows[0].target_stamp_ns) - self._windows[0].target_frame
+        yaw_rad = self._backdrop.yaw_rad(first)
+        yield from self._backdrop.messages(self.first_ns, self.last_ns, shift_ns=shift_ns, grid_yaw_rad=yaw_rad)
 
     def _grids(self, shift_ns: int) -> Iterator[Outgoing]:
         for index, window, inputs_ns in zip(self._indices, self._windows, self._inputs_ns, strict=True):
@@ -257,11 +257,11 @@ class _Track:
     def _input_stamps_ns(self, window: WindowRecord) -> tuple[int, ...]:
         if window.input_stamps_ns:
             return window.input_stamps_ns
-        if self._drive is None:
+        if self._backdrop is None:
             raise ResultError("its result keeps no times of inputs; add the logs", field=f"row {self._scored.row.name}")
         row = self._scored.row
-        last = self._drive.frame_at(window.target_stamp_ns) - row.horizon_steps * row.step_frames
-        return tuple(self._drive.stamp_ns(last - back * row.step_frames) for back in reversed(range(row.inputs)))
+        last = self._backdrop.frame_at(window.target_stamp_ns) - row.horizon_steps * row.step_frames
+        return tuple(self._backdrop.stamp_ns(last - back * row.step_frames) for back in reversed(range(row.inputs)))
 
 
 def _metadata(record: RunRecord, scored: _Scored, shifts_ns: dict[str, int]) -> dict[str, str]:

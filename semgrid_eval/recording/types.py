@@ -5,6 +5,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
+from semgrid_eval.motion import MotionSample as MotionSample
+from semgrid_eval.motion import Pose as Pose
 
 
 @dataclass(frozen=True)
@@ -37,27 +40,16 @@ class CameraCalibration:
             if getattr(self, name) <= 0:
                 raise InputError(f"{getattr(self, name)} is not positive", field=name)
 
+    @property
+    def ego_from_camera(self) -> SE3:
+        """From the camera's axes (forward, left, up) to the vehicle frame."""
+        place_m = (self.x_m, self.y_m, self.z_m)
+        return SE3.from_roll_pitch_yaw(self.roll_rad, self.pitch_rad, self.yaw_rad, place_m)
 
-@dataclass(frozen=True)
-class MotionSample:
-    """What the vehicle reports of its own motion at one time; GPS where it has one."""
-
-    stamp_ns: int
-    speed_mps: float
-    yaw_rate_radps: float  # left-positive
-    latitude_deg: float | None = None
-    longitude_deg: float | None = None
-    heading_deg: float | None = None  # clockwise from north, as GPS gives it
-
-
-@dataclass(frozen=True)
-class Pose:
-    """A planar pose of the vehicle frame in a fixed map frame (x east, y north, yaw counter-clockwise from x)."""
-
-    stamp_ns: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
+    @property
+    def ego_from_optical(self) -> SE3:
+        """From the optical axes (right, down, forward) to the vehicle frame."""
+        return self.ego_from_camera @ CAMERA_FROM_OPTICAL
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from semgrid_eval.config import Config, load_yaml, parse_config
 from semgrid_eval.errors import ConfigError
-from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.flow import FlowConfig
 from semgrid_eval.models.network import NetworkConfig
 from semgrid_eval.models.predictor import installed_models
@@ -32,6 +32,11 @@ ROW_LIMIT = 10_000
 _ENDS = ("upper", "lower")
 
 
+def _target_sensors(known: dict[str, Any]) -> tuple[str, ...]:
+    """Return the sensors of the target of a row's grid, none where that is at fault itself."""
+    return known["grid"].target if "grid" in known else ()
+
+
 class Row(Config):
     """One experiment with everything that determines it.
 
@@ -40,7 +45,7 @@ class Row(Config):
         experiment: the group in which a report compares rows; the name without `BL-` or `ED-` if not given.
         model: `ed`, a baseline (`newest`, `overlay`, `fuse`, `table`, `flow`), `path.py:Class` of one's own, or the
             name of an installed one.
-        sensors: inputs, from the grid config's sensors.
+        sensors: inputs, from the grid config's sensors; those of its target if not given.
         translate: whether inputs are moved to the target's time (T2); the paper's NT rows do not.
         mask_mode: what becomes of the mask M in scores (reading 9).
         overlay: which sensor the `overlay` baseline draws last (reading 20).
@@ -53,7 +58,8 @@ class Row(Config):
     name: str = Field(min_length=1, max_length=200)
     experiment: str = ""
     model: str
-    sensors: tuple[str, ...] = Field((TARGET_SENSOR,), min_length=1)
+    grid: GridConfig = GridConfig()
+    sensors: tuple[str, ...] = Field(default_factory=_target_sensors, min_length=1)
     translate: bool = True
     mask_mode: MaskMode = "exclude"
     overlay: Literal["upper", "lower"] = "upper"
@@ -61,7 +67,6 @@ class Row(Config):
     repeats: int = Field(1, ge=1, le=1000)
     train_split: str = "train"
     validation_split: str = "val"
-    grid: GridConfig = GridConfig()
     window: WindowConfig = WindowConfig()
     validation_window: WindowConfig | None = None
     network: NetworkConfig = NetworkConfig()
@@ -69,10 +74,9 @@ class Row(Config):
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
-        known = [sensor.name for sensor in self.grid.all_sensors()]
         for sensor in self.sensors:
-            if sensor not in known:
-                raise ValueError(f"sensor {sensor!r} is not one of {', '.join(known)}")
+            if sensor not in self.grid.sensors:
+                raise ValueError(f"sensor {sensor!r} is not one of {', '.join(self.grid.sensors)}")
         if not self.built_in and ":" not in self.model and self.model not in (installed := installed_models()):
             models = ", ".join((TRAINED_MODEL, *BASELINES, *installed))
             raise ValueError(f"model {self.model!r} is not one of {models} or path.py:Class")

@@ -15,6 +15,7 @@ import torch
 from semgrid_eval.errors import ConfigError, SemgridError, first_line
 from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
 from semgrid_eval.files import digest_value
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.device import choose_device, keep_freed_memory
 from semgrid_eval.progress import Progress, Stage, silent, silent_stage
 from semgrid_eval.runs.matrix import Matrix, Row
@@ -121,11 +122,11 @@ def run_matrix(
     return keep_record()
 
 
-def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[WindowSet, str | None]]:
-    """Return the windows of rows that have some, and the camera that they show."""
+def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[WindowSet, GridConfig]]:
+    """Return the windows of rows that have some, and how their grids were made."""
     for row in rows:
         with suppress(SemgridError, torch.OutOfMemoryError):  # its units will tell
-            yield worker.scored_windows(row)[0], row.grid.camera
+            yield worker.scored_windows(row)[0], row.grid
 
 
 def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:

@@ -9,7 +9,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.executors import Executor
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.build import GridDataSet, build_grids
-from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.fingerprint import kept_fingerprints
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.progress import Stage
@@ -93,7 +93,7 @@ class Sources:
                     self._logs,
                     self._cache,
                     config,
-                    sensors=[*self._sensors[key], TARGET_SENSOR],
+                    sensors=self._sensors[key],
                     executor=self._executor,
                     progress=progress,
                 )

@@ -1,4 +1,4 @@
-"""Keeps small pictures of the frames that a run's windows use, and the drive; what a log cannot give is left out."""
+"""Keeps small pictures of the frames that a run's windows use, and the track; what a log cannot give is left out."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -10,21 +10,23 @@ import numpy as np
 from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError, LogError, ResultError, SemgridError
 from semgrid_eval.executors import Executor
-from semgrid_eval.grids.geometry import nearest_indices, unit_projection
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import topics
 from semgrid_eval.log.container import damage_as_log_error
 from semgrid_eval.log.store import LogReader
-from semgrid_eval.playback.drive import drive_poses
+from semgrid_eval.motion import Integrator
 from semgrid_eval.progress import Stage
 from semgrid_eval.recording.png import decode_colour, decode_ids, encode_gray, read_header, with_palette
 from semgrid_eval.scores.thumbnails import (
-    Drive,
     FramePictures,
     LogPictures,
+    Track,
     pictures_file,
     read_pictures,
     write_pictures,
 )
+from semgrid_eval.sensors.camera import CameraSensor, frame_poses
+from semgrid_eval.sensors.projection import nearest_indices, unit_projection
 
 if TYPE_CHECKING:  # processes that only shrink pictures need no torch
     from semgrid_eval.windows.data import WindowSet
@@ -34,17 +36,17 @@ WEBP_QUALITY = 75
 
 
 class Request(NamedTuple):
-    """The frames of one camera of one log whose pictures are to lie in `file`."""
+    """The frames of a log whose pictures are to lie in `file`; the camera is the one that leads the grids' target."""
 
     log: Path
     digest: str
-    camera: str | None
+    grid: GridConfig
     stamps_ns: frozenset[int]
     file: Path
 
 
 def keep_pictures(
-    run: Path, windows: Iterable[tuple["WindowSet", str | None]], executor: Executor, stage: Stage
+    run: Path, windows: Iterable[tuple["WindowSet", GridConfig]], executor: Executor, stage: Stage
 ) -> None:
     """Make sure that the pictures of all frames of windows lie in the run's folder, as far as the logs have them.
 
@@ -52,7 +54,7 @@ def keep_pictures(
 
     Args:
         run: folder of the run.
-        windows: sets of windows, each with the camera of its grids.
+        windows: sets of windows, each with how its grids were made.
         executor: works on several logs at once.
         stage: shows progress.
 
@@ -69,25 +71,27 @@ def keep_pictures(
             progress(done, len(missing), missing[index].log.stem)
 
 
-def log_pictures(log: Path, digest: str, camera: str | None, stamps_ns: Iterable[int]) -> LogPictures:
-    """Read the drive of a log and make small pictures of some of its frames; what it does not have stays empty.
+def log_pictures(log: Path, digest: str, grid: GridConfig, stamps_ns: Iterable[int]) -> LogPictures:
+    """Read the track of a log and make small pictures of some of its frames; what it does not have stays empty.
 
     Raises:
-        LogError: the log cannot be read, is damaged, or has another digest.
+        LogError: the log cannot be read, is damaged, or has another digest, or no camera leads the target.
     """
     wanted = set(stamps_ns)
     found: dict[int, dict[str, bytes]] = {stamp: {} for stamp in wanted}
     with LogReader(log) as reader:
         if reader.digest != digest:
             raise LogError(f"has digest {reader.digest}, not {digest}", path=log)
-        name = reader.choose_camera(camera)
-        drive = _drive(reader, name)
+        if grid.camera is None:
+            raise LogError(f"{grid.target[0]!r} is not a camera", path=log)
+        name = reader.choose_camera(grid.camera.camera)
+        track = _track(reader, grid.camera, grid.integrator)
         for stamp_ns, _, channel, png in reader.pictures([name], _SHRINK):
             if stamp_ns > max(wanted, default=-1):
                 break
             if stamp_ns in wanted:
                 found[stamp_ns][channel] = _SHRINK[channel](png)
-    return LogPictures(drive, {stamp: FramePictures(**files) for stamp, files in found.items()})
+    return LogPictures(track, {stamp: FramePictures(**files) for stamp, files in found.items()})
 
 
 def small_image(png: bytes) -> bytes:
@@ -120,34 +124,34 @@ def _small_size(height: int, width: int) -> tuple[int, int]:
     return (height, width) if width <= WIDTH_PX else (max(1, round(WIDTH_PX * height / width)), WIDTH_PX)
 
 
-def _drive(reader: LogReader, camera: str) -> Drive:
-    poses = drive_poses(reader, camera)
+def _track(reader: LogReader, sensor: CameraSensor, integrator: Integrator) -> Track:
+    poses, camera = frame_poses(reader, sensor, integrator), reader.choose_camera(sensor.camera)
     first = next(reader.pictures([camera], [topics.DISPARITY]))
     with damage_as_log_error(reader.path):
         header = read_header(first.png)
-    return Drive(
+    return Track(
         start_ns=reader.start_ns,
-        track_ns=np.array([pose.stamp_ns for pose in poses], np.int64),
-        track=np.array([(pose.x_m, pose.y_m, pose.yaw_rad) for pose in poses], np.float64),
+        stamps_ns=np.array([pose.stamp_ns for pose in poses], np.int64),
+        poses=np.array([(pose.x_m, pose.y_m, pose.yaw_rad) for pose in poses], np.float64),
         projection=unit_projection(reader.calibration(camera), (header.width, header.height)),
     )
 
 
-def _requests(run: Path, windows: Iterable[tuple["WindowSet", str | None]]) -> list[Request]:
+def _requests(run: Path, windows: Iterable[tuple["WindowSet", GridConfig]]) -> list[Request]:
     """Gather the frames of all windows by log and camera; rows share most of them.
 
     Paths are absolute, since the executor's processes may stand elsewhere.
     """
     logs: dict[Path, Request] = {}
-    for chosen, camera in windows:
+    for chosen, grid in windows:
         data = chosen.data
         frames = np.unique(np.append(chosen.inputs.cpu().numpy(), chosen.target_frames.cpu().numpy()))
         owners, begins = np.unique(data.locate(frames)[0], return_index=True)
         for owner, own in zip(owners.tolist(), np.split(frames, begins[1:]), strict=True):
             stamps_ns = frozenset(data.stamps_ns[own].tolist())
-            file = pictures_file(run.resolve(), data.digests[owner], camera)
+            file = pictures_file(run.resolve(), data.digests[owner], grid)
             known = logs[file].stamps_ns if file in logs else frozenset()
-            logs[file] = Request(Path(data.logs[owner]).resolve(), data.digests[owner], camera, known | stamps_ns, file)
+            logs[file] = Request(Path(data.logs[owner]).resolve(), data.digests[owner], grid, known | stamps_ns, file)
     return list(logs.values())
 
 
@@ -155,11 +159,11 @@ def _keep(request: Request) -> InputError | None:
     """Add what is missing to a log's pictures, or return why that cannot be written."""
     kept = _kept(request.file)
     try:
-        made = log_pictures(request.log, request.digest, request.camera, request.stamps_ns - kept.keys())
+        made = log_pictures(request.log, request.digest, request.grid, request.stamps_ns - kept.keys())
     except SemgridError:
         return None
     try:
-        write_pictures(request.file, LogPictures(made.drive, {**kept, **made.frames}))
+        write_pictures(request.file, LogPictures(made.track, {**kept, **made.frames}))
     except InputError as error:
         return error
     return None

@@ -11,7 +11,7 @@ from semgrid_eval.arrays import write_arrays
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import atomic_folder, digest_files, digest_value
-from semgrid_eval.grids.build import FORMAT_VERSION as GRIDS
+from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
 from semgrid_eval.models.baselines import FuseAll, OverlaySensors, RepeatNewest
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
 from semgrid_eval.models.device import choose_precision
@@ -248,7 +248,8 @@ def target_key(row: Row, scored: WindowSet) -> str:
     owners, places = scored.data.locate(frames)
     digests = [scored.data.digests[owner] for owner in owners]
     targets = sorted(zip(digests, scored.data.stamps_ns[frames].tolist(), places.tolist(), strict=True))
-    return digest_value([targets, grid_digest(row.grid), row.mask_mode, row.validation_split, list(CLASS_NAMES)])
+    grid = row.grid.target_identity()
+    return digest_value([targets, grid, row.mask_mode, row.validation_split, list(CLASS_NAMES)])
 
 
 def identity(row: Row) -> dict[str, object]:

@@ -1,12 +1,12 @@
-"""What a run keeps of a log so that a report can show it: small pictures of the frames in windows, and the drive.
+"""What a run keeps of a log so that a report can show it: small pictures of the frames in windows, and the track.
 
-`RUN/pictures/<key>.npz` holds that of one camera of one log, `<key>` being the digest of both:
+`RUN/pictures/<key>.npz` holds that of one camera of one log, `<key>` being the digest of both and of the integrator:
 
 - `stamps_ns` (K,) int64, ascending; the files of all images, then of all labels, one after the other as `images` and
   `labels` uint8, and where each ends as `image_ends` and `label_ends` (K,) int64. An empty file stands for a picture
   that the log does not have.
 - `start_ns` (1,) int64, when the log begins; `track_ns` (F,) int64, times of all frames, `track` (F, 3) float64, poses
-  of the vehicle there, and `projection` (3, 4) float64, as `Drive` says.
+  of the vehicle there, and `projection` (3, 4) float64, as `Track` says.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.errors import ResultError
 from semgrid_eval.files import digest_value
+from semgrid_eval.grids.spec import GridConfig
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 _FILES = ("images", "image_ends", "labels", "label_ends")
-_DRIVE = ("start_ns", "track_ns", "track", "projection")
+_TRACK = ("start_ns", "track_ns", "track", "projection")
 
 
 @dataclass(frozen=True)
@@ -41,34 +42,35 @@ class FramePictures:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
-    """Where vehicle and camera are.
+class Track:
+    """Where vehicle and camera are at each frame of a log.
 
     Args:
         start_ns: when the log begins.
-        track_ns: (F,) times of all frames.
-        track: (F, 3) x and y (m) and yaw (rad) of the vehicle there, in the log's odom frame.
+        stamps_ns: (F,) times of all frames.
+        poses: (F, 3) x and y (m) and yaw (rad) of the vehicle there, in the log's odom frame, as grids are moved by.
         projection: (3, 4) takes points in the vehicle frame (x, y, z, 1) to the image (w u, w v, w), u and v going
             from 0 at its left and upper edge to 1 at its right and lower one, w being the depth in metres.
     """
 
     start_ns: int
-    track_ns: NDArray[np.int64]
-    track: NDArray[np.float64]
+    stamps_ns: NDArray[np.int64]
+    poses: NDArray[np.float64]
     projection: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class LogPictures:
-    """What is kept of a log: the drive, and pictures of frames by their stamps (ns)."""
+    """What is kept of a log: the track, and pictures of frames by their stamps (ns)."""
 
-    drive: Drive
+    track: Track
     frames: Mapping[int, FramePictures] = field(default_factory=dict)
 
 
-def pictures_file(run: Path, log_digest: str, camera: str | None) -> Path:
-    """Where the pictures of a camera of a log lie; None stands for a log's only camera."""
-    key = {"log": log_digest, "camera": camera, "format": FORMAT_VERSION}
+def pictures_file(run: Path, log_digest: str, grid: GridConfig) -> Path:
+    """Return where the pictures lie of the camera that leads the target of a log's grids."""
+    camera = grid.camera.camera if grid.camera else None
+    key = {"log": log_digest, "camera": camera, "integrator": grid.integrator, "format": FORMAT_VERSION}
     return run / "pictures" / f"{digest_value(key)}.npz"
 
 
@@ -81,11 +83,11 @@ def write_pictures(path: Path, kept: LogPictures) -> None:
     stamps_ns = sorted(kept.frames)
     images, image_ends = _joined([kept.frames[stamp].image for stamp in stamps_ns])
     labels, label_ends = _joined([kept.frames[stamp].label for stamp in stamps_ns])
-    drive = kept.drive
+    track = kept.track
     arrays: dict[str, NDArray[Any]] = {
         "stamps_ns": np.array(stamps_ns, np.int64),
         **dict(zip(_FILES, (images, image_ends, labels, label_ends), strict=True)),
-        **dict(zip(_DRIVE, (np.array([drive.start_ns]), drive.track_ns, drive.track, drive.projection), strict=True)),
+        **dict(zip(_TRACK, (np.array([track.start_ns]), track.stamps_ns, track.poses, track.projection), strict=True)),
     }
     write_arrays(path, arrays)
 
@@ -96,30 +98,30 @@ def read_pictures(path: Path) -> LogPictures:
     Raises:
         ResultError: it is missing or malformed.
     """
-    arrays = read_arrays(path, ("stamps_ns", *_FILES, *_DRIVE))
+    arrays = read_arrays(path, ("stamps_ns", *_FILES, *_TRACK))
     stamps_ns = _checked(arrays, "stamps_ns", (-1,), np.int64, path).tolist()
     images = _cut(arrays, "images", "image_ends", path)
     labels = _cut(arrays, "labels", "label_ends", path)
     if not len(stamps_ns) == len(images) == len(labels):
         raise ResultError(f"{len(stamps_ns)} frames have {len(images)} images and {len(labels)} labels", path=path)
     frames = {stamp: FramePictures(*files) for stamp, *files in zip(stamps_ns, images, labels, strict=True)}
-    return LogPictures(_drive(arrays, path), frames)
+    return LogPictures(_track(arrays, path), frames)
 
 
-def read_drive(path: Path) -> Drive:
-    """Read the drive alone of what is kept of a log.
+def read_track(path: Path) -> Track:
+    """Read the track alone of what is kept of a log.
 
     Raises:
         ResultError: it is missing or malformed.
     """
-    return _drive(read_arrays(path, _DRIVE), path)
+    return _track(read_arrays(path, _TRACK), path)
 
 
-def _drive(arrays: Mapping[str, NDArray[Any]], path: Path) -> Drive:
+def _track(arrays: Mapping[str, NDArray[Any]], path: Path) -> Track:
     start_ns = int(_checked(arrays, "start_ns", (1,), np.int64, path)[0])
-    track_ns = _checked(arrays, "track_ns", (-1,), np.int64, path)
-    track = _checked(arrays, "track", (len(track_ns), 3), np.float64, path)
-    return Drive(start_ns, track_ns, track, _checked(arrays, "projection", (3, 4), np.float64, path))
+    stamps_ns = _checked(arrays, "track_ns", (-1,), np.int64, path)
+    poses = _checked(arrays, "track", (len(stamps_ns), 3), np.float64, path)
+    return Track(start_ns, stamps_ns, poses, _checked(arrays, "projection", (3, 4), np.float64, path))
 
 
 def _joined(files: Sequence[bytes]) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:

@@ -10,14 +10,21 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import DIGEST_CHARACTERS
-from semgrid_eval.grids.spec import TARGET_SENSOR
 from semgrid_eval.windows.plan import Window
+from semgrid_eval.windows.shift import covered_without_truth, shift_grids, shift_in_cells
 
 if TYPE_CHECKING:  # building grids needs the log readers; using built ones does not
-    from semgrid_eval.grids.build import GridRecording
+    from semgrid_eval.grids.recording import GridRecording
+
+
+GHOST_S = 1.5
+"""How long an actor's footprints stay near a target.
+
+That holds all ghosts that rows of the paper can leave: five inputs, or a horizon three steps longer, reach back 25
+frames, 1.47 s.
+"""
 
 
 @dataclass(frozen=True)
@@ -27,6 +34,7 @@ class GridData:
     Args:
         grids: (S, F, H, W) uint8 class ids.
         sensors: names along S.
+        target: which of them the targets come from.
         recordings: names of the recordings, and `logs` the paths of their logs.
         digests: of those logs.
         first_frames: (R + 1,) where each recording begins along F, and F.
@@ -39,6 +47,7 @@ class GridData:
 
     grids: Tensor
     sensors: tuple[str, ...]
+    target: str
     recordings: tuple[str, ...]
     logs: tuple[str, ...]
     digests: tuple[str, ...]
@@ -61,6 +70,30 @@ class GridData:
         """Find frames, indices along F: (N,) -> the recording of each (N,) and the index of the frame there (N,)."""
         owners = np.searchsorted(self.first_frames, frames, side="right") - 1
         return owners, frames - self.first_frames[owners]
+
+    def actors_near(self, target_frames: NDArray[np.int64]) -> NDArray[np.uint8] | None:
+        """Flag where true actors are, or were during the last `GHOST_S`: -> (N, H, W), in the targets' places.
+
+        There a model without any idea of motion may leave a ghost, whichever inputs it has: the flags are those of a
+        target, whatever a row sees. Footprints of all frames of that time are moved by the ego motion, like grids, and
+        are grown by `MARGIN_M`. Targets of recordings without the truth have no flags; None where no recording has it.
+
+        Args:
+            target_frames: (N,) indices along F.
+        """
+        if all(flags is None for flags in self.actors):
+            return None
+        found = np.zeros((len(target_frames), *self.grids.shape[-2:]), np.uint8)
+        for result, target, owner in zip(found, target_frames, self.locate(target_frames)[0], strict=True):
+            if (flags := self.actors[owner]) is not None:
+                begin = self.first_frames[owner]
+                age_s = (self.stamps_ns[target] - self.stamps_ns[begin : target + 1]) * 1e-9
+                first = begin + int(np.argmax(age_s <= GHOST_S))
+                moved_m = self.position_m[target] - self.position_m[first : target + 1]
+                shift_cells = torch.from_numpy(shift_in_cells(moved_m, self.cell_m))
+                seen = torch.from_numpy(flags[first - begin : target + 1 - begin])
+                np.bitwise_or.reduce(shift_grids(seen, shift_cells).numpy(), axis=0, out=result)
+        return found
 
     def sensor_index(self, name: str) -> int:
         """Find a sensor.
@@ -131,7 +164,7 @@ class WindowSet:
         shift_cells = self.shift_cells[chosen]
         seen = self.data.grids[self.sensor_rows[None, :, None], self.inputs[chosen][:, None, :]]
         aligned = shift_grids(seen, shift_cells[:, None])
-        target = self.data.grids[self.data.sensor_index(TARGET_SENSOR), self.target_frames[chosen]]
+        target = self.data.grids[self.data.sensor_index(self.data.target), self.target_frames[chosen]]
         return WindowBatch(
             past=aligned if self.translate else seen,
             sensors=self.sensors,
@@ -142,25 +175,8 @@ class WindowSet:
         )
 
     def actors(self, chosen: slice) -> NDArray[np.uint8] | None:
-        """Flag where true actors are at the target's time, or were in an input: -> (B, H, W).
-
-        The inputs' footprints are moved into the target's place, like their grids: there a model without any idea of
-        motion leaves a ghost. Windows of recordings without the truth have no flags; None where no recording has it.
-        """
-        if all(flags is None for flags in self.data.actors):
-            return None
-        found = self._flags_of(self.target_frames[chosen].cpu().numpy())
-        for place in range(self.inputs.shape[1]):
-            flags = torch.from_numpy(self._flags_of(self.inputs[chosen, place].cpu().numpy()))
-            found |= shift_grids(flags, self.shift_cells[chosen, place].cpu()).numpy()
-        return found
-
-    def _flags_of(self, frames: NDArray[np.int64]) -> NDArray[np.uint8]:
-        result = np.zeros((len(frames), *self.data.grids.shape[-2:]), np.uint8)
-        for flags, owner, frame in zip(result, *self.data.locate(frames), strict=True):
-            if (known := self.data.actors[owner]) is not None:
-                flags[:] = known[frame]
-        return result
+        """Flag the cells near true actors, as `GridData.actors_near` does: -> (B, H, W)."""
+        return self.data.actors_near(self.target_frames[chosen].cpu().numpy())
 
     def batches(self, size: int) -> Iterator[WindowBatch]:
         """Pass over all windows in order, `size` at a time."""
@@ -185,7 +201,8 @@ def stack_recordings(
     """
     if not recordings:
         raise InputError("there are no grids to take windows from")
-    kept = tuple(dict.fromkeys([*(sensors or recordings[0].sensors), TARGET_SENSOR]))
+    target = recordings[0].target
+    kept = tuple(dict.fromkeys([*(sensors or recordings[0].sensors), target]))
     size = recordings[0].grids.shape[-2:]
     first_frames = np.concatenate([[0], np.cumsum([len(entry.stamps_ns) for entry in recordings])]).astype(np.int64)
     grids = torch.empty((len(kept), int(first_frames[-1]), *size), dtype=torch.uint8)
@@ -197,6 +214,7 @@ def stack_recordings(
     return GridData(
         grids=grids,
         sensors=kept,
+        target=target,
         recordings=tuple(entry.name for entry in recordings),
         logs=tuple(entry.log for entry in recordings),
         digests=tuple(entry.digest for entry in recordings),
@@ -238,37 +256,6 @@ def select_windows(
     )
 
 
-def shift_in_cells(moved_m: NDArray[np.float64], cell_m: float) -> NDArray[np.int64]:
-    """Round the way of the ego vehicle (..., 2: forward, left) to the cells (rows, columns) that content moves by.
-
-    Driving forward brings content nearer (down the rows); driving left moves it right (up the columns).
-    """
-    return np.rint(moved_m / cell_m).astype(np.int64)
-
-
-def shift_grids(grids: Tensor, shift_cells: Tensor) -> Tensor:
-    """Move content by whole cells (T2): (..., H, W) by (..., 2) rows and columns -> (..., H, W).
-
-    What leaves the grid is lost, and cells that enter it are unknown.
-    """
-    rows, columns = grids.shape[-2:]
-    source_row = torch.arange(rows, device=grids.device) - shift_cells[..., 0:1]  # (..., H)
-    source_column = torch.arange(columns, device=grids.device) - shift_cells[..., 1:2]  # (..., W)
-    inside = _within(source_row, rows)[..., :, None] & _within(source_column, columns)[..., None, :]
-    source = source_row.clamp(0, rows - 1)[..., :, None] * columns + source_column.clamp(0, columns - 1)[..., None, :]
-    flat = grids.flatten(-2)
-    moved = flat.gather(-1, source.flatten(-2).expand(flat.shape)).reshape(grids.shape)
-    return torch.where(inside, moved, UNKNOWN)
-
-
-def covered_without_truth(aligned: Tensor, target: Tensor) -> Tensor:
-    """Compute the mask M: aligned (B, S, T, H, W) and target (B, H, W) -> (B, H, W) bool.
-
-    The paper's M = M_covered - M_target; the target's own cells of M_covered cancel out.
-    """
-    return (aligned != UNKNOWN).flatten(1, 2).any(dim=1) & (target == UNKNOWN)
-
-
 def window_arrays(windows: WindowSet, *, batch: int = 64) -> dict[str, NDArray[np.uint8] | NDArray[np.bool_]]:
     """Return what a run keeps: aligned inputs (N, S, T, H, W), target, mask and, with the truth, actors (N, H, W)."""
     aligned = replace(windows, translate=True)
@@ -276,10 +263,6 @@ def window_arrays(windows: WindowSet, *, batch: int = 64) -> dict[str, NDArray[n
     inputs, target, mask = (torch.cat(column).numpy() for column in zip(*parts, strict=True))
     actors = windows.actors(slice(None))
     return {"inputs": inputs, "target": target, "mask": mask, **({} if actors is None else {"actors": actors})}
-
-
-def _within(index: Tensor, size: int) -> Tensor:
-    return (index >= 0) & (index < size)
 
 
 def _check_recording(entry: "GridRecording", sensors: tuple[str, ...], size: tuple[int, ...]) -> None:

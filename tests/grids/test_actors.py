@@ -11,7 +11,7 @@ from support.toy_world import FRAME_NS, Box, ToyWorld, street
 
 from semgrid_eval.classes import CLASS_NAMES, LABEL_ID
 from semgrid_eval.errors import LogError
-from semgrid_eval.grids.actors import MOVING_FROM_MPS, boxes_in_grid, draw_boxes
+from semgrid_eval.grids.actors import MARGIN_M, MOVING_FROM_MPS, boxes_in_grid, draw_boxes
 from semgrid_eval.grids.build import build_grids, build_log
 from semgrid_eval.grids.spec import MOVING, STANDING, GridConfig, GridSpec
 from semgrid_eval.log.store import write_log
@@ -33,7 +33,7 @@ def slow_signed_m(who, pose, yaw_rad, spec, row, column):
     vehicle = complex(forward_m, left_m) * np.exp(-1j * yaw_rad)  # out of the grid's orientation
     place = complex(pose.x_m, pose.y_m) + vehicle * np.exp(1j * pose.yaw_rad)
     inside = (place - complex(who.x_m, who.y_m)) * np.exp(-1j * who.yaw_rad)
-    return min(who.length_m / 2 + spec.cell_m - abs(inside.real), who.width_m / 2 + spec.cell_m - abs(inside.imag))
+    return min(who.length_m / 2 + MARGIN_M - abs(inside.real), who.width_m / 2 + MARGIN_M - abs(inside.imag))
 
 
 ANGLES = st.floats(-7, 7)
@@ -73,10 +73,19 @@ def covers(who, pose):
 def test_a_car_ahead_lies_where_the_arithmetic_says():
     flags = draw_boxes(boxes_in_grid([actor(4.0, 1.0)], Pose(0, 0.0, 0.0, 0.0), 0.0), SPEC)
     rows, columns = np.nonzero(flags)
-    # 4 x 2 m and a margin of 0.5 m: 1.5 to 6.5 m ahead of row 20, 0.5 m right to 2.5 m left of column 11
-    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (7, 16, 6, 11)
-    assert len(rows) == 10 * 6
+    # 4 x 2 m and a margin of 0.78 m: 1.22 to 6.78 m ahead of row 20, 0.78 m right to 2.78 m left of column 11
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (6, 17, 5, 12)
+    assert len(rows) == 12 * 8
     assert set(flags[flags > 0]) == {STANDING}
+
+
+@pytest.mark.parametrize("cell_m", [100 / 128, 100 / 256, 0.1])
+def test_the_margin_is_as_many_metres_on_a_finer_grid_and_a_cell_of_the_papers(cell_m):
+    size = round(20 / cell_m)
+    spec = GridSpec(rows=size, columns=size, cell_m=cell_m, agent_row=size, agent_column=size // 2)
+    flags = draw_boxes(boxes_in_grid([actor(10.0, 0.0)], Pose(0, 0.0, 0.0, 0.0), 0.0), spec)
+    length_m, width_m = (np.ptp(places) * cell_m + cell_m for places in np.nonzero(flags))
+    assert (length_m, width_m) == pytest.approx((4.0 + 2 * 100 / 128, 2.0 + 2 * 100 / 128), abs=cell_m)
 
 
 def test_the_vehicle_itself_is_no_actor():

@@ -1,3 +1,5 @@
+import zipfile
+
 import numpy as np
 import pytest
 from support.toy_world import Box, ToyWorld, street
@@ -8,6 +10,7 @@ from semgrid_eval.executors import Processes
 from semgrid_eval.grids.build import build_grids, build_log
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.log.store import write_log
+from semgrid_eval.sensors.camera import CameraSensor
 
 POLE = CLASS_NAMES.index("pole_sign")
 CELL_M = GridSpec().cell_m
@@ -87,14 +90,34 @@ def test_grids_are_built_once_and_again_when_the_configuration_changes(tmp_path)
     assert (other.recordings[0].grids != first.recordings[0].grids).any()
 
 
+def entries(folder):
+    (kept,) = folder.iterdir()
+    with zipfile.ZipFile(kept) as archive:
+        return archive.namelist()
+
+
+def test_stretches_of_a_long_log_come_back_from_as_many_arrays_as_one(tmp_path):
+    path = tmp_path / "toy.mcap"
+    write_log(street(2, frames=9, yaw_rate_radps=0.2).recording("toy"), path)
+    built_first = build_grids([path], tmp_path / "cut", GridConfig(stretch_frames=2)).recordings
+    read_again = build_grids([path], tmp_path / "cut", GridConfig(stretch_frames=2)).recordings
+    assert [recording.name for recording in read_again] == ["toy#1", "toy#2", "toy#3", "toy#4"]
+    for one, same in zip(build_log(path, GridConfig(stretch_frames=2)), read_again, strict=True):
+        for name in ("stamps_ns", "grids", "position_m", "yaw_rad"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(same, name))
+    assert len(built_first) == 4
+    build_grids([path], tmp_path / "whole", GridConfig())
+    assert entries(tmp_path / "cut") == entries(tmp_path / "whole")
+
+
 def test_only_the_sensors_that_are_asked_for_are_kept_in_memory(tmp_path):
     path = tmp_path / "toy.mcap"
     write_log(street(2, frames=2).recording(), path)
     (whole,) = build_grids([path], tmp_path / "grids", GridConfig()).recordings
-    for sensors in (["split2_lower", "full"], ["full"]):  # built, and then found
+    for sensors in (["split2_lower", "full"], []):  # built, and then found
         (part,) = build_grids([path], tmp_path / "grids", GridConfig(), sensors=sensors).recordings
-        assert set(part.sensors) == set(sensors)
-        for name in sensors:
+        assert set(part.sensors) == {*sensors, "full"}, "the target is always needed"
+        for name in part.sensors:
             mine, all_of = part.grids[part.sensors.index(name)], whole.grids[whole.sensors.index(name)]
             np.testing.assert_array_equal(mine, all_of)
 
@@ -131,7 +154,7 @@ def test_longer_logs_are_cut_into_stretches_that_begin_straight(tmp_path):
 
 def test_a_camera_that_a_log_lacks_is_named(tmp_path):
     with pytest.raises(LogError, match=r"toy\.mcap: camera: rear is not one of: front"):
-        built(street(1, frames=1), tmp_path, GridConfig(camera="rear"))
+        built(street(1, frames=1), tmp_path, GridConfig(sensors={"full": CameraSensor(camera="rear")}))
 
 
 def test_class_map_moves_a_label_to_another_class(tmp_path):

@@ -4,55 +4,63 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from scipy import ndimage
-from support.cameras import calibration, slow_point
+from support.cameras import calibration
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, CLASSES, NO_POINT
-from semgrid_eval.grids.geometry import ground_rays
-from semgrid_eval.grids.rasterise import LabelledImage, count_points, rasterise
+from semgrid_eval.geometry import SE2
+from semgrid_eval.grids.rasterise import STATIC_KERNELS_CELLS, add_points, no_points, rasterise
 from semgrid_eval.grids.spec import GridSpec
+from semgrid_eval.sensors.projection import Projection
+from semgrid_eval.sensors.sensor import Points
 
 ROAD, SIDEWALK, POLE, CAR, PERSON = (CLASS_NAMES.index(n) for n in ("road", "sidewalk", "pole_sign", "car", "person"))
 SMALL = GridSpec(rows=16, columns=16, cell_m=2.0, agent_row=16, agent_column=8)
 
 
-def slow_counts(image, camera, yaw_rad, crops, spec):
-    """One pixel after the other, with nothing but school geometry."""
-    counts = np.zeros((len(crops), CLASS_COUNT, spec.rows, spec.columns), int)
-    height, width = image.classes.shape
-    for v in range(height):
-        for u in range(width):
-            label, value = int(image.classes[v, u]), int(image.disparity[v, u])
-            if label == NO_POINT or value <= 1:
-                continue
-            depth_m = camera.fx_px * camera.baseline_m / ((value - 1) / 256)
-            x, y = slow_point(camera, u, v, depth_m)
-            c, s = math.cos(yaw_rad), math.sin(yaw_rad)
-            forward, left = c * x - s * y, s * x + c * y
-            row = spec.agent_row - 1 - math.floor(forward / spec.cell_m)
-            column = spec.agent_column - 1 - math.floor(left / spec.cell_m)
+TURN = st.builds(SE2, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+
+
+def points_of(forward_m, left_m, class_id):
+    return Points("any", 0, np.asarray(forward_m, float), np.asarray(left_m, float), np.asarray(class_id, np.uint8))
+
+
+def counted(points, grid_from_points, spec):
+    counts = no_points(spec)
+    add_points(counts, points, grid_from_points, spec)
+    return counts
+
+
+def slow_counts(points, move, spec):
+    """One point after the other, with nothing but school geometry."""
+    counts = np.zeros((CLASS_COUNT, spec.rows, spec.columns), int)
+    flat = zip(points.forward_m.ravel(), points.left_m.ravel(), points.class_id.ravel(), strict=True)
+    for x, y, label in flat:
+        if label != NO_POINT:
+            c, s = math.cos(move.yaw_rad), math.sin(move.yaw_rad)
+            row = spec.agent_row - 1 - math.floor((c * x - s * y + move.x_m) / spec.cell_m)
+            column = spec.agent_column - 1 - math.floor((s * x + c * y + move.y_m) / spec.cell_m)
             if 0 <= row < spec.rows and 0 <= column < spec.columns:
-                for s_, (top, bottom, left_px, right_px) in enumerate(crops):
-                    if top <= v < bottom and left_px <= u < right_px:
-                        counts[s_, label, row, column] += 1
+                counts[label, row, column] += 1
     return counts
 
 
 @settings(max_examples=60)
-@given(
-    arrays(np.uint8, (6, 8), elements=st.sampled_from([0, 1, 5, 9, NO_POINT])),
-    arrays(np.uint16, (6, 8), elements=st.integers(0, 400)),
-    st.floats(-3.0, 3.0),
-    st.floats(-0.2, 0.2),
-)
-def test_counts_match_a_pixel_by_pixel_twin(classes, disparity, yaw_rad, pitch_rad):
-    camera = calibration(fx_px=8.0, fy_px=8.1, u0_px=3.9, v0_px=2.8, pitch_rad=pitch_rad)
-    image = LabelledImage(classes, disparity)
-    crops = np.array([[0, 6, 0, 8], [1, 4, 2, 7]])
-    rays = ground_rays(camera, (8, 6), (8, 6))
-    fast = count_points(image, rays, yaw_rad, crops, SMALL)
-    np.testing.assert_array_equal(fast, slow_counts(image, camera, yaw_rad, crops, SMALL))
+@given(st.integers(0, 2**32 - 1), st.sampled_from([(40,), (5, 8), (0,)]), TURN)
+def test_counts_match_a_point_by_point_twin(seed, shape, move):
+    random = np.random.default_rng(seed)
+    places_m, classes = random.uniform(-40, 40, (2, *shape)), random.choice([0, 1, 5, 9, NO_POINT], shape)
+    points = points_of(*places_m, classes)
+    np.testing.assert_array_equal(counted(points, move, SMALL), slow_counts(points, move, SMALL))
+
+
+def test_points_of_several_sensors_are_added_and_a_part_of_an_image_is_counted_alone():
+    whole = points_of(np.full((4, 6), 9.0), np.full((4, 6), 1.0), np.full((4, 6), ROAD))
+    part = points_of(whole.forward_m[1:3, 2:5], whole.left_m[1:3, 2:5], whole.class_id[1:3, 2:5])
+    counts = counted(whole, SE2(0.0, 0.0, 0.0), SMALL)
+    add_points(counts, part, SE2(0.0, 0.0, 0.0), SMALL)
+    assert np.argwhere(counts).tolist() == [[ROAD, 11, 7]]
+    assert counts[ROAD, 11, 7] == 24 + 6
 
 
 def slow_decision(counts, layers):
@@ -139,6 +147,21 @@ def test_a_lone_cell_of_a_small_class_is_filtered_and_two_by_two_stay():
     assert (rasterise(counts) == POLE).sum() == 4
 
 
+def road_with_gap(gap_m, cell_m):
+    """Class ids (H, W) of a grid over a road that nothing is seen of for `gap_m`."""
+    spec = GridSpec(rows=64, columns=64, cell_m=cell_m, agent_row=64, agent_column=32)
+    x, y = np.meshgrid(np.arange(0.05, 64 * cell_m, 0.1), np.arange(0.05, 64 * cell_m, 0.1) - 32 * cell_m)
+    is_seen = np.abs(x - 32 * cell_m) > gap_m / 2
+    return rasterise(counted(points_of(x, y, np.where(is_seen, ROAD, NO_POINT)), SE2(0.0, 0.0, 0.0), spec))
+
+
+@pytest.mark.parametrize("cell_m", [0.8, 0.4])
+def test_kernels_are_cells_so_that_a_finer_grid_bridges_shorter_gaps(cell_m):
+    assert STATIC_KERNELS_CELLS[0] == 3
+    bridged = [gap for gap in (2, 4, 6) if (road_with_gap(gap * cell_m, cell_m)[20:44, 20:44] == ROAD).all()]
+    assert bridged == [2], "a dilation by 3 cells reaches one cell from either side, 1.6 m at most or 0.8 m"
+
+
 @pytest.mark.parametrize("yaw_deg", [-30, 0, 30])
 @pytest.mark.parametrize("pitch_rad", [-0.05, 0.0, 0.038])
 @pytest.mark.parametrize("camera_yaw_rad", [-0.1, 0.0, 0.1])
@@ -147,27 +170,26 @@ def test_a_pole_lands_in_the_cell_that_the_arithmetic_says(yaw_deg, pitch_rad, c
     camera = calibration(pitch_rad=pitch_rad, yaw_rad=camera_yaw_rad)
     spec = GridSpec()
     u, v, disparity = pixel_of(camera, 20.0, left_m, 1.0)
-    classes = np.full((256, 512), NO_POINT, np.uint8)
-    values = np.zeros((256, 512), np.uint16)
-    classes[v, u], values[v, u] = POLE, disparity
-    rays = ground_rays(camera, (512, 256), (512, 256))
-    counts = count_points(
-        LabelledImage(classes, values), rays, math.radians(yaw_deg), np.array([[0, 256, 0, 512]]), spec
-    )
+    counts = counted(seen(camera, u, v, disparity), SE2(0.0, 0.0, math.radians(yaw_deg)), spec)
     c, s = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
     forward, left = 20.0 * c - left_m * s, 20.0 * s + left_m * c
     expected = (127 - math.floor(forward / 0.78125), 63 - math.floor(left / 0.78125))
-    assert np.argwhere(counts[0, POLE]).tolist() == [list(expected)]
+    assert np.argwhere(counts[POLE]).tolist() == [list(expected)]
 
 
 def test_pole_20_m_ahead_and_5_m_left_is_row_102_column_57():
     camera = calibration()
     u, v, disparity = pixel_of(camera, 20.0, 5.0, 1.0)
-    image = LabelledImage(np.full((256, 512), NO_POINT, np.uint8), np.zeros((256, 512), np.uint16))
-    image.classes[v, u], image.disparity[v, u] = POLE, disparity
-    rays = ground_rays(camera, (512, 256), (512, 256))
-    counts = count_points(image, rays, 0.0, np.array([[0, 256, 0, 512]]), GridSpec())
-    assert np.argwhere(counts[0, POLE]).tolist() == [[102, 57]]
+    counts = counted(seen(camera, u, v, disparity), SE2(0.0, 0.0, 0.0), GridSpec())
+    assert np.argwhere(counts[POLE]).tolist() == [[102, 57]]
+
+
+def seen(camera, u, v, disparity):
+    """What a camera sees that has a pole in one pixel and nothing in all others."""
+    image = np.zeros((256, 512), np.uint16)
+    image[v, u] = disparity
+    table = np.full(256, POLE, np.uint8)
+    return points_of(*Projection(camera, (512, 256), table).points(image, np.zeros((256, 512), np.uint8)))
 
 
 def pixel_of(camera, forward_m, left_m, up_m):

@@ -1,3 +1,4 @@
+import json
 import math
 
 import pytest
@@ -7,10 +8,11 @@ from hypothesis import strategies as st
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.sensors.camera import CameraSensor
 
 
 def boxes(config):
-    return {s.name: (s.top_px, s.bottom_px, s.left_px, s.right_px) for s in config.all_sensors()}
+    return {name: sensor.crop_px for name, sensor in config.sensors.items()}
 
 
 def test_default_sensors_are_the_supplements_splits():
@@ -23,15 +25,35 @@ def test_default_sensors_are_the_supplements_splits():
     }
 
 
-def test_rows_counted_from_the_bottom_move_the_blind_band_up():
-    turned = boxes(GridConfig(y_axis="up"))
-    assert turned["split2_upper"] == (0, 111, 40, 472)
-    assert turned["split2_lower"] == (131, 256, 40, 472)
-    assert turned["split1_upper"] == (0, 126, 0, 512)
+def test_there_are_grids_of_each_sensor_and_of_a_target_of_several():
+    sensors = {name: CameraSensor(camera=name) for name in ("front", "rear", "side")}
+    alone, both = (GridConfig(sensors=sensors, target=target) for target in (("rear",), ("rear", "front")))
+    assert alone.rows == {name: (name,) for name in sensors}
+    assert both.rows == {**alone.rows, "rear+front": ("rear", "front")}
+    assert (alone.target_row, both.target_row) == ("rear", "rear+front")
+    assert both.camera == sensors["rear"]
 
 
-def test_splits_scale_with_the_image():
-    assert boxes(GridConfig(image_size_px=(1024, 512)))["split2_lower"] == (290, 512, 80, 944)
+def test_targets_are_the_same_whatever_else_there_is_and_whatever_sensors_are_called():
+    plain = GridConfig()
+    alone = GridConfig(sensors={"whole": CameraSensor()}, target=("whole",))
+    assert alone.target_identity() == plain.target_identity()
+    others = [
+        GridConfig(morphology="off"),
+        GridConfig(integrator="arc"),
+        GridConfig(stretch_frames=29),
+        GridConfig(class_map={"terrain": None}),
+        GridConfig(spec=GridSpec(rows=64, agent_row=64)),
+        GridConfig(sensors={"full": CameraSensor(image_size_px=(1024, 512))}),
+        GridConfig(target=("split1_upper",)),
+        GridConfig(target=("split1_upper", "split1_lower")),
+    ]
+    assert len({json.dumps(config.target_identity()) for config in (plain, *others)}) == 1 + len(others)
+
+
+def test_settings_come_back_from_json():
+    config = GridConfig(sensors={"a": CameraSensor(camera="rear", top_px=7)}, target=("a",))
+    assert parse_config(GridConfig, config.model_dump(mode="json")) == config
 
 
 def test_centres_are_half_a_cell_from_the_vehicle_and_a_cell_apart():
@@ -64,9 +86,21 @@ def test_a_point_at_a_cells_centre_is_drawn_in_that_cell(spec):
         ({"morfology": "off"}, "morfology: unknown key"),
         ({"morphology": "none"}, "morphology"),
         ({"spec": {"rows": 0}}, "spec.rows"),
-        ({"image_size_px": [4, 4]}, "outside 16 to 8192"),
-        ({"sensors": [{"name": "a", "bottom_px": 300, "right_px": 10}]}, "reaches beyond the image"),
-        ({"sensors": [{"name": "full", "bottom_px": 30, "right_px": 10}]}, "repeat"),
+        ({"sensors": {"full": {"image_size_px": [4, 4]}}}, "sensors.full: .*outside 16 to 8192"),
+        ({"sensors": {"full": {"bottom_px": 300}}}, "sensors.full: .*reaches beyond the image"),
+        ({"sensors": {"full": {"bottom_px": 30, "top_px": 30}}}, "sensors.full: .*covers no pixel"),
+        (
+            {"sensors": {"full": {"top": 30}}},
+            "sensors.full: unknown key 'top'; allowed here: bottom_px, camera, .*top_px",
+        ),
+        ({"sensors": {"full": {"kind": "sonar"}}}, "sensors.full: kind 'sonar' is not one of camera"),
+        ({"sensors": {"full": {"kind": ["camera"]}}}, "sensors.full: kind .* is not one of camera"),
+        ({"sensors": {"full": {"bottom_px": "3"}}}, "sensors.full.bottom_px: .*found '3'"),
+        ({"sensors": {"full": 3}}, "sensors.full"),
+        ({"sensors": {"a b": {}}}, "sensors.a b"),
+        ({"sensors": {"front": {}}}, "target: 'full' is not one of the sensors front"),
+        ({"target": []}, "target"),
+        ({"target": ["full", "full"]}, "target: a sensor repeats"),
         ({"spec": {"rows": "128"}}, "spec.rows"),
     ],
 )

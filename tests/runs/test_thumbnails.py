@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 import yaml
 from PIL import Image
-from support.toy_world import FRAME_NS, HEIGHT, WIDTH, png, street
+from support.own_clock import with_own_motion
+from support.toy_world import FRAME_NS, HEIGHT, START_NS, WIDTH, png, street
 
 from semgrid_eval.classes import LABEL_ID, label_palette
 from semgrid_eval.errors import LogError
 from semgrid_eval.executors import InProcess, Processes
+from semgrid_eval.geometry import SE2
+from semgrid_eval.grids.build import build_log
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import LogReader, write_log
 from semgrid_eval.recording.png import decode_ids
 from semgrid_eval.runs.matrix import load_matrix
@@ -18,8 +22,8 @@ from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.runs.thumbnails import log_pictures, small_image, small_label
 from semgrid_eval.scores import results
 from semgrid_eval.scores.thumbnails import FramePictures, pictures_file, read_pictures
+from semgrid_eval.sensors.camera import CameraSensor
 
-START_NS = 10**18
 SHORT = {"name": "BL-DC", "model": "newest", "window": {"step_frames": 3, "target_frame": 8}}
 LONG = {"name": "BL-late", "model": "newest", "window": {"step_frames": 2, "target_frame": 8, "horizon_steps": 2}}
 
@@ -46,7 +50,7 @@ def digest(log):
 
 def kept_frames(out, log):
     """Indices of the frames of a log whose pictures a run keeps."""
-    pictures = read_pictures(pictures_file(out, digest(log), None)).frames
+    pictures = read_pictures(pictures_file(out, digest(log), GridConfig())).frames
     return [(stamp - START_NS) // FRAME_NS for stamp in sorted(pictures)]
 
 
@@ -65,7 +69,7 @@ def test_pictures_show_what_the_camera_saw(logs, tmp_path):
     log = logs / "val" / "toy1.mcap"
     with LogReader(log) as reader:
         frames = {frame.stamp_ns: frame for frame in reader.frames("front", images=True)}
-    for stamp_ns, kept in read_pictures(pictures_file(tmp_path / "run", digest(log), None)).frames.items():
+    for stamp_ns, kept in read_pictures(pictures_file(tmp_path / "run", digest(log), GridConfig())).frames.items():
         frame = frames[stamp_ns]
         assert np.array_equal(decode_ids(kept.label), decode_ids(frame.label_png))
         shown = np.asarray(Image.open(io.BytesIO(kept.image)).convert("RGB"), int)
@@ -145,7 +149,9 @@ def test_a_log_without_images_gives_labels_alone(tmp_path):
     write_log(without_images(street(1, frames=9).recording("dark")), tmp_path / "logs" / "dark.mcap")
     record = run(tmp_path / "logs", tmp_path / "run", SHORT)
     assert record.rows[0].failure is None
-    pictures = read_pictures(pictures_file(tmp_path / "run", digest(tmp_path / "logs" / "dark.mcap"), None)).frames
+    pictures = read_pictures(
+        pictures_file(tmp_path / "run", digest(tmp_path / "logs" / "dark.mcap"), GridConfig())
+    ).frames
     assert [(bool(each.image), bool(each.label)) for each in pictures.values()] == [(False, True)] * 3
     before = files(tmp_path / "run")
     run(tmp_path / "logs", tmp_path / "run", SHORT)
@@ -154,27 +160,45 @@ def test_a_log_without_images_gives_labels_alone(tmp_path):
 
 def test_frames_that_a_log_does_not_have_stay_empty_and_another_log_gives_none(logs):
     log = logs / "val" / "toy0.mcap"
-    assert log_pictures(log, digest(log), "front", [7]).frames == {7: FramePictures()}
-    for known, camera, message in (("another", None, "has digest"), (digest(log), "rear", "rear is not one of: front")):
+    assert log_pictures(log, digest(log), GridConfig(), [7]).frames == {7: FramePictures()}
+    rear = GridConfig(sensors={"full": CameraSensor(camera="rear")})
+    for known, grid, message in (
+        ("another", GridConfig(), "has digest"),
+        (digest(log), rear, "rear is not one of: front"),
+    ):
         with pytest.raises(LogError, match=message):
-            log_pictures(log, known, camera, [START_NS])
+            log_pictures(log, known, grid, [START_NS])
 
 
-def test_the_drive_is_kept_with_the_camera_that_sees_it(logs, tmp_path):
+@pytest.mark.parametrize("integrator", ["euler", "arc"])
+def test_the_track_moves_as_the_grids_do_where_frames_lie_between_motion_samples(tmp_path, integrator):
+    path, grid = tmp_path / "toy.mcap", GridConfig(integrator=integrator)
+    write_log(with_own_motion(street(0, frames=12).recording()), path)
+    (recording,) = build_log(path, grid)
+    track = log_pictures(path, digest(path), grid, []).track
+    np.testing.assert_array_equal(track.stamps_ns, recording.stamps_ns)
+    poses = [SE2(*pose) for pose in track.poses]
+    seen = [pose.seen_from(poses[0]) for pose in poses]
+    np.testing.assert_allclose([(pose.x_m, pose.y_m) for pose in seen], recording.position_m, atol=1e-12)
+    np.testing.assert_allclose([pose.yaw_rad for pose in seen], recording.yaw_rad, atol=1e-12)
+    assert np.ptp(recording.yaw_rad) > 0.01
+
+
+def test_the_track_is_kept_with_the_camera_that_sees_it(logs, tmp_path):
     run(logs, tmp_path / "run", SHORT)
     log = logs / "val" / "toy0.mcap"
-    drive = read_pictures(pictures_file(tmp_path / "run", digest(log), None)).drive
-    assert drive.start_ns == drive.track_ns[0] == START_NS
-    assert (np.diff(drive.track_ns) == FRAME_NS).all()
-    assert np.allclose(drive.track[:, 0], 8.0 * FRAME_NS * 1e-9 * np.arange(9))  # the toy drives straight at 8 m/s
-    assert not drive.track[:, 1:].any()
+    track = read_pictures(pictures_file(tmp_path / "run", digest(log), GridConfig())).track
+    assert track.start_ns == track.stamps_ns[0] == START_NS
+    assert (np.diff(track.stamps_ns) == FRAME_NS).all()
+    assert np.allclose(track.poses[:, 0], 8.0 * FRAME_NS * 1e-9 * np.arange(9))  # the toy drives straight at 8 m/s
+    assert not track.poses[:, 1:].any()
     world = street(0)
     u, v = 40, 100  # a pixel that sees the road
     label, depth_m = world.render((0.0, 0.0, 0.0))
     assert label[v, u] == LABEL_ID["road"]
     origin_m, ray = world._rays((0.0, 0.0, 0.0))
     point_m = [origin_m[i] + depth_m[v, u] * ray[i][v, u] for i in range(3)]
-    x, y, w = drive.projection @ [*point_m, 1.0]
+    x, y, w = track.projection @ [*point_m, 1.0]
     assert (x / w * WIDTH - 0.5, y / w * HEIGHT - 0.5, w) == pytest.approx((u, v, depth_m[v, u]))
 
 

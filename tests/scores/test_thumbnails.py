@@ -7,19 +7,21 @@ from hypothesis import strategies as st
 
 from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.errors import ResultError
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.scores.thumbnails import (
-    Drive,
     FramePictures,
     LogPictures,
+    Track,
     pictures_file,
-    read_drive,
     read_pictures,
+    read_track,
     write_pictures,
 )
+from semgrid_eval.sensors.camera import CameraSensor
 
-DRIVE = Drive(-7, np.array([1, 2]), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]), np.arange(12.0).reshape(3, 4))
+TRACK = Track(-7, np.array([1, 2]), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]), np.arange(12.0).reshape(3, 4))
 FRAMES = {5: FramePictures(b"five", b"labels"), -3: FramePictures(), 9: FramePictures(label=b"nine")}
-PICTURES = LogPictures(DRIVE, FRAMES)
+PICTURES = LogPictures(TRACK, FRAMES)
 NAMES = ("stamps_ns", "images", "image_ends", "labels", "label_ends", "start_ns", "track_ns", "track", "projection")
 
 
@@ -27,23 +29,29 @@ NAMES = ("stamps_ns", "images", "image_ends", "labels", "label_ends", "start_ns"
 @given(st.dictionaries(st.integers(-(2**63), 2**63 - 1), st.builds(FramePictures, st.binary(), st.binary())))
 def test_what_is_written_is_read(tmp_path_factory, pictures):
     path = tmp_path_factory.mktemp("kept") / "pictures.npz"
-    write_pictures(path, LogPictures(DRIVE, pictures))
+    write_pictures(path, LogPictures(TRACK, pictures))
     found = read_pictures(path)
     assert found.frames == pictures
-    for name, value in vars(DRIVE).items():
-        np.testing.assert_array_equal(getattr(found.drive, name), value)
+    for name, value in vars(TRACK).items():
+        np.testing.assert_array_equal(getattr(found.track, name), value)
 
 
 def test_equal_pictures_give_equal_bytes_whatever_their_order(tmp_path):
     write_pictures(tmp_path / "a", PICTURES)
-    write_pictures(tmp_path / "b", LogPictures(DRIVE, dict(reversed(FRAMES.items()))))
+    write_pictures(tmp_path / "b", LogPictures(TRACK, dict(reversed(FRAMES.items()))))
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
-def test_logs_and_cameras_have_files_of_their_own(tmp_path):
-    files = [pictures_file(tmp_path, log, camera) for log in ("one", "two") for camera in (None, "front", "rear")]
-    assert len(set(files)) == 6
+def of(camera, **changes):
+    return GridConfig(sensors={"full": CameraSensor(camera=camera)}, **changes)
+
+
+def test_logs_cameras_and_integrators_have_files_of_their_own(tmp_path):
+    grids = [of(None), of("front"), of("rear"), of(None, integrator="arc")]
+    files = [pictures_file(tmp_path, log, grid) for log in ("one", "two") for grid in grids]
+    assert len(set(files)) == 8
     assert {file.parent for file in files} == {tmp_path / "pictures"}
+    assert pictures_file(tmp_path, "one", of(None, morphology="off")) == files[0]
 
 
 @pytest.mark.parametrize(
@@ -71,14 +79,14 @@ def test_files_that_contradict_themselves_are_refused(tmp_path, name, value, mes
         read_pictures(tmp_path / "kept")
 
 
-def test_the_drive_can_be_read_alone(tmp_path):
+def test_the_track_can_be_read_alone(tmp_path):
     write_pictures(tmp_path / "kept", PICTURES)
-    alone = read_drive(tmp_path / "kept")
-    assert alone.start_ns == PICTURES.drive.start_ns
-    for name in ("track_ns", "track", "projection"):
-        np.testing.assert_array_equal(getattr(alone, name), getattr(PICTURES.drive, name))
+    alone = read_track(tmp_path / "kept")
+    assert alone.start_ns == PICTURES.track.start_ns
+    for name in ("stamps_ns", "poses", "projection"):
+        np.testing.assert_array_equal(getattr(alone, name), getattr(PICTURES.track, name))
     with pytest.raises(ResultError, match="cannot be read"):
-        read_drive(tmp_path / "none")
+        read_track(tmp_path / "none")
 
 
 def test_a_missing_or_damaged_file_is_told(tmp_path):

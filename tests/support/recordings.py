@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.grids.build import GridRecording
+from semgrid_eval.grids.recording import GridRecording
 
 FRAME_NS = 58_823_529
 
@@ -26,6 +26,7 @@ def recording(
         dataset="synthetic",
         split="train",
         sensors=sensors,
+        target="full",
         stamps_ns=np.arange(frames, dtype=np.int64) * FRAME_NS,
         grids=grids,
         position_m=np.zeros((frames, 2)) if position_m is None else np.asarray(position_m, np.float64),

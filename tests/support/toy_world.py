@@ -15,6 +15,7 @@ from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment,
 
 WIDTH, HEIGHT = 256, 128
 FRAME_NS = 58_823_529  # 17 Hz
+START_NS = 10**18
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,14 @@ class Box:
     height: float
 
 
+@dataclass(frozen=True)
+class Mount:
+    """How a camera is turned, and by how much its clock is late."""
+
+    yaw_rad: float = 0.0
+    late_ns: int = 0
+
+
 @dataclass
 class ToyWorld:
     """A street along x with what stands on it, and the drive of the ego vehicle through it."""
@@ -40,8 +49,9 @@ class ToyWorld:
     pitch_rad: float = 0.038
     noise_px: float = 0.0
     seed: int = 0
+    cameras: dict[str, Mount] = field(default_factory=lambda: {"front": Mount()})
 
-    def calibration(self) -> CameraCalibration:
+    def calibration(self, camera: str = "front") -> CameraCalibration:
         return CameraCalibration(
             fx_px=282.75,
             fy_px=283.1,
@@ -53,19 +63,19 @@ class ToyWorld:
             z_m=1.22,
             roll_rad=0.0,
             pitch_rad=self.pitch_rad,
-            yaw_rad=0.0,
+            yaw_rad=self.cameras[camera].yaw_rad,
         )
 
+    def pose_at(self, since_ns: int) -> tuple[float, float, float]:
+        """Where the vehicle is as x, y, yaw, on a true arc."""
+        t, w, v = since_ns * 1e-9, self.yaw_rate_radps, self.speed_mps
+        if w:
+            return v / w * math.sin(w * t), v / w * (1 - math.cos(w * t)), w * t
+        return v * t, 0.0, 0.0
+
     def poses(self) -> list[tuple[float, float, float]]:
-        """The drive as x, y, yaw, a true arc."""
-        poses = []
-        for frame in range(self.frames):
-            t, w, v = frame * FRAME_NS * 1e-9, self.yaw_rate_radps, self.speed_mps
-            if w:
-                poses.append((v / w * math.sin(w * t), v / w * (1 - math.cos(w * t)), w * t))
-            else:
-                poses.append((v * t, 0.0, 0.0))
-        return poses
+        """The poses at the frames of a camera that is not late."""
+        return [self.pose_at(frame * FRAME_NS) for frame in range(self.frames)]
 
     def recording(self, name: str = "toy_000000_000000", split: str = "val", direction: float = 1.0) -> Recording:
         """The recording; `direction` -1 reports the motion with the wrong sign."""
@@ -73,30 +83,32 @@ class ToyWorld:
             name=name,
             dataset="toy",
             split=split,
-            calibrations={"front": self.calibration()},
+            calibrations={camera: self.calibration(camera) for camera in self.cameras},
             source_digest=f"{name}-{direction}-{self!r}",
             moments=lambda: self._moments(direction),
         )
 
     def _moments(self, direction: float) -> Iterator[Moment]:
         rng = np.random.default_rng(self.seed)
-        for frame, pose in enumerate(self.poses()):
-            stamp_ns = 10**18 + frame * FRAME_NS
-            label, depth = self.render(pose)
-            disparity = 282.75 * 0.209 / depth
-            disparity += rng.normal(0, self.noise_px, disparity.shape) if self.noise_px else 0.0
-            coded = np.where(np.isfinite(depth) & (disparity > 0), np.rint(disparity * 256) + 1, 0).astype(np.uint16)
-            motion = MotionSample(stamp_ns, direction * self.speed_mps, direction * self.yaw_rate_radps)
-            colour = np.repeat(label[..., None] * 7, 3, axis=2)
-            yield Moment(
-                stamp_ns,
-                {"front": CameraFrame(stamp_ns, png(colour), png(coded), png(label))},
-                motion=(motion,),
-            )
+        late_ns = sorted({mount.late_ns for mount in self.cameras.values()})
+        for since_ns in (frame * FRAME_NS + late for frame in range(self.frames) for late in late_ns):
+            stamp_ns = START_NS + since_ns
+            cameras = [name for name, mount in self.cameras.items() if (since_ns - mount.late_ns) % FRAME_NS == 0]
+            frames = {camera: self._frame(camera, since_ns, rng) for camera in cameras}
+            sample = MotionSample(stamp_ns, direction * self.speed_mps, direction * self.yaw_rate_radps)
+            yield Moment(stamp_ns, frames, motion=(sample,) if since_ns % FRAME_NS == 0 else ())
 
-    def render(self, pose: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    def _frame(self, camera: str, since_ns: int, rng: np.random.Generator) -> CameraFrame:
+        label, depth = self.render(self.pose_at(since_ns), camera)
+        disparity = 282.75 * 0.209 / depth
+        disparity += rng.normal(0, self.noise_px, disparity.shape) if self.noise_px else 0.0
+        coded = np.where(np.isfinite(depth) & (disparity > 0), np.rint(disparity * 256) + 1, 0).astype(np.uint16)
+        colour = np.repeat(label[..., None] * 7, 3, axis=2)
+        return CameraFrame(START_NS + since_ns, png(colour), png(coded), png(label))
+
+    def render(self, pose: tuple[float, float, float], camera: str = "front") -> tuple[np.ndarray, np.ndarray]:
         """Label ids and depth along the optical axis (H, W) from one pose."""
-        origin, ray = self._rays(pose)
+        origin, ray = self._rays(pose, camera)
         depth = np.full((HEIGHT, WIDTH), np.inf)
         label = np.full((HEIGHT, WIDTH), LABEL_ID["sky"], np.uint8)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -114,12 +126,14 @@ class ToyWorld:
                 label[hit] = LABEL_ID[box.label]
         return label, depth
 
-    def _rays(self, pose):
-        c = self.calibration()
+    def _rays(self, pose, camera="front"):
+        c = self.calibration(camera)
         u, v = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
         forward, left, up = np.ones(u.shape), -(u - c.u0_px) / c.fx_px, -(v - c.v0_px) / c.fy_px
         cp, sp = math.cos(c.pitch_rad), math.sin(c.pitch_rad)
         forward, up = cp * forward + sp * up, -sp * forward + cp * up
+        cy, sy = math.cos(c.yaw_rad), math.sin(c.yaw_rad)
+        forward, left = cy * forward - sy * left, sy * forward + cy * left
         x, y, yaw = pose
         cy, sy = math.cos(yaw), math.sin(yaw)
         origin = (x + cy * c.x_m - sy * c.y_m, y + sy * c.x_m + cy * c.y_m, c.z_m)

@@ -1,5 +1,7 @@
 """Batches: shift and mask against slow twins, gathering by hand, and faults in the data."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -8,15 +10,9 @@ from hypothesis import strategies as st
 from support.recordings import FRAME_NS, random_recording, recording
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.windows.data import (
-    covered_without_truth,
-    select_windows,
-    shift_grids,
-    shift_in_cells,
-    stack_recordings,
-    window_arrays,
-)
+from semgrid_eval.windows.data import GHOST_S, select_windows, stack_recordings, window_arrays
 from semgrid_eval.windows.plan import Window, WindowConfig, training_windows, validation_windows
+from semgrid_eval.windows.shift import covered_without_truth, shift_grids, shift_in_cells
 
 SENSORS = ("full", "upper", "lower")
 
@@ -142,24 +138,44 @@ def test_window_arrays_are_aligned_and_do_not_depend_on_the_batch():
     assert np.array_equal(arrays["inputs"], aligned.past)
 
 
-@pytest.mark.parametrize("translate", [True, False])
-def test_actors_lie_at_the_target_and_where_inputs_saw_them(translate):
+def slow_flags(source, target):
+    """Footprints of every frame of the last second and a half, moved one after the other."""
+    expected = np.zeros(source.actors.shape[1:], np.uint8)
+    for frame in range(target + 1):
+        if source.stamps_ns[target] - source.stamps_ns[frame] <= GHOST_S * 1e9:
+            shift = np.rint((source.position_m[target] - source.position_m[frame]) / 0.5).astype(int)
+            expected |= slow_shift(source.actors[frame], *shift)
+    return expected
+
+
+def test_actors_lie_at_the_target_and_where_they_were_before_it():
     recordings = [random_recording(seed, truth=seed != 1) for seed in range(3)]
     data = stack_recordings(recordings, cell_m=0.5)
-    plan = training_windows(data.frame_counts, WindowConfig(horizon_steps=2))
-    windows = select_windows(data, plan.windows, sensors=["full"], translate=translate)
+    plan = training_windows(data.frame_counts, WindowConfig(inputs=1, step_frames=2))
+    windows = select_windows(data, plan.windows, sensors=["full"])
     flags = np.concatenate([windows.actors(slice(start, start + 7)) for start in range(0, len(windows), 7)])
     for window, found in zip(plan.windows, flags, strict=True):
         source = recordings[window.recording]
-        target = window.target_frame
-        expected = np.zeros((16, 16), np.uint8)
-        if source.actors is not None:
-            expected |= source.actors[target]
-            for frame in window.input_frames:
-                shift = np.rint((source.position_m[target] - source.position_m[frame]) / 0.5).astype(int)
-                expected |= slow_shift(source.actors[frame], *shift)
+        nothing = np.zeros((16, 16), np.uint8)
+        expected = nothing if source.actors is None else slow_flags(source, window.target_frame)
         np.testing.assert_array_equal(found, expected)
     assert np.array_equal(window_arrays(windows)["actors"], flags)
+
+
+def test_actors_are_the_same_whatever_a_row_sees():
+    data = stack_recordings([random_recording(3, sensors=SENSORS, truth=True)], cell_m=0.5)
+    rows = [(2, 1, ["full"], True), (5, 1, ["full"], True), (2, 4, ["full"], True), (2, 1, ["upper", "lower"], False)]
+    found = []
+    for inputs, horizon_steps, sensors, translate in rows:
+        config = WindowConfig(inputs=inputs, horizon_steps=horizon_steps)
+        plan = validation_windows(data.frame_counts, config)
+        windows = select_windows(data, plan.windows, sensors=sensors, translate=translate)
+        found.append(windows.actors(slice(None)))
+        reach_ns = data.stamps_ns[25] - data.stamps_ns[plan.windows[0].input_frames[0]]
+        assert reach_ns <= GHOST_S * 1e9, "the ghosts of all rows of the paper lie inside"
+    assert found[0].any()
+    for other in found[1:]:
+        np.testing.assert_array_equal(other, found[0])
 
 
 def test_without_the_truth_there_are_no_actors():
@@ -173,6 +189,14 @@ def test_only_needed_sensors_are_kept():
     data = stack_recordings([random_recording(0, sensors=SENSORS)], cell_m=0.5, sensors=["lower"])
     assert data.sensors == ("lower", "full")
     assert data.grids.shape == (2, 30, 16, 16)
+
+
+def test_the_target_may_be_another_sensor():
+    recordings = [replace(random_recording(0, sensors=SENSORS), target="upper")]
+    data = stack_recordings(recordings, cell_m=0.5, sensors=["lower"])
+    assert data.sensors == ("lower", "upper")
+    batch = select_windows(data, [Window(0, (0, 5), 10)], sensors=["lower"]).batch(slice(None))
+    assert np.array_equal(batch.target[0], recordings[0].grids[1, 10])
 
 
 def test_digest_tells_windows_apart():

@@ -5,11 +5,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.grids.spec import TARGET_SENSOR, GridConfig
-from semgrid_eval.report.examples.blind import blind_cells
+from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.report.examples.blind import blind_cells, parts_of_shown
 from semgrid_eval.report.examples.drawing import Picture, data_uri, hatch_png, label_picture
 from semgrid_eval.scores.results import WindowRecord
 from semgrid_eval.scores.thumbnails import LogPictures
+from semgrid_eval.sensors.camera import CameraSensor
 
 
 @dataclass(frozen=True)
@@ -63,26 +64,25 @@ class View:
 
     @property
     def crops(self) -> tuple[Crop, ...]:
-        """The parts of the image that the sensors see, none for the whole image."""
+        """The parts of the shown image that the sensors see, none for the whole image."""
         if self.grid is None:
             return ()
-        width, height = self.grid.image_size_px
-        return tuple(
-            Crop(
-                sensor.name,
-                100 * sensor.left_px / width,
-                100 * sensor.top_px / height,
-                100 * (sensor.right_px - sensor.left_px) / width,
-                100 * (sensor.bottom_px - sensor.top_px) / height,
-            )
-            for sensor in self.grid.all_sensors()
-            if sensor.name in self.sensors and sensor.name != TARGET_SENSOR
-        )
+        parts = parts_of_shown(self.grid)
+        seen = [name for name in self.sensors if name in parts and not parts[name].is_whole_image]
+        return tuple(_crop(name, parts[name]) for name in seen)
 
     @property
     def hatching(self) -> str:
         """A picture to lay over grids that marks the ground that no sensor of an input sees; empty if there is none."""
-        if self.kept is None or self.grid is None or TARGET_SENSOR in self.sensors:
+        if self.kept is None or self.grid is None:
             return ""
-        cells = blind_cells(self.kept.drive, self.grid, self.sensors, self.window)
+        cells = blind_cells(self.kept.track, self.grid, self.sensors, self.window)
         return data_uri(hatch_png(cells)) if cells is not None and cells.any() else ""
+
+
+def _crop(name: str, part: CameraSensor) -> Crop:
+    width, height = part.image_size_px
+    top, bottom, left, right = part.crop_px
+    return Crop(
+        name, 100 * left / width, 100 * top / height, 100 * (right - left) / width, 100 * (bottom - top) / height
+    )

@@ -16,7 +16,7 @@ from semgrid_eval.report.examples.kept import Glimpses
 from semgrid_eval.report.rows.load import Result, Row, Run
 from semgrid_eval.report.tables.side_by_side import part_differences, part_frame, part_values
 from semgrid_eval.report.tables.table import Table
-from semgrid_eval.scores.thumbnails import Drive
+from semgrid_eval.scores.thumbnails import Track
 
 PACE_EDGES_MPS = (0.5, 4.0, 8.0)
 PACES = ("standing", "below 4 m/s", "4 to 8 m/s", "above 8 m/s")
@@ -65,9 +65,9 @@ def pace_frame(paces: Mapping[str, Scores]) -> pd.DataFrame:
     return part_frame(paces, "pace", _KEPT)
 
 
-def mean_speed_mps(drive: Drive, from_ns: int, to_ns: int) -> float:
+def mean_speed_mps(track: Track, from_ns: int, to_ns: int) -> float:
     """Return the speed at which the straight way between two times is driven."""
-    x_m, y_m = (np.interp([from_ns, to_ns], drive.track_ns, drive.track[:, axis]) for axis in (0, 1))
+    x_m, y_m = (np.interp([from_ns, to_ns], track.stamps_ns, track.poses[:, axis]) for axis in (0, 1))
     return float(np.hypot(x_m[1] - x_m[0], y_m[1] - y_m[0]) / ((to_ns - from_ns) * 1e-9))
 
 
@@ -75,9 +75,9 @@ def _paces(result: Result, kept: Glimpses) -> NDArray[np.int64]:
     """Number the pace of each window: (N,), -1 where nothing is known of the drive."""
     found = np.full(len(result.record.windows), -1, np.int64)
     for i, window in enumerate(result.record.windows):
-        drive, newest_ns = kept.drive(window.log, result), max(window.input_stamps_ns, default=window.target_stamp_ns)
-        if drive is not None and len(drive.track_ns) and newest_ns < window.target_stamp_ns:
-            found[i] = np.digitize(mean_speed_mps(drive, newest_ns, window.target_stamp_ns), PACE_EDGES_MPS)
+        track, newest_ns = kept.track(window.log, result), max(window.input_stamps_ns, default=window.target_stamp_ns)
+        if track is not None and len(track.stamps_ns) and newest_ns < window.target_stamp_ns:
+            found[i] = np.digitize(mean_speed_mps(track, newest_ns, window.target_stamp_ns), PACE_EDGES_MPS)
     return found
 
 

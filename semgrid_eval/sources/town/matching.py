@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.sources.town.sensors import Camera, ego_from_camera_rotation
+from semgrid_eval.sources.town.sensors import Camera
 
 NEAREST_M = 3.0
 """What is nearer than this is not matched."""
@@ -59,5 +59,5 @@ class StereoMatcher:
 def right_of(camera: Camera) -> Camera:
     """Return the right camera of the pair whose left one this is."""
     left = camera.calibration
-    x_m, y_m, z_m = ego_from_camera_rotation(left) @ (left.baseline_m, 0.0, 0.0) + (left.x_m, left.y_m, left.z_m)
+    x_m, y_m, z_m = left.ego_from_optical.apply(np.array([left.baseline_m, 0.0, 0.0]))
     return replace(camera, calibration=replace(left, x_m=float(x_m), y_m=float(y_m), z_m=float(z_m)))

@@ -40,16 +40,6 @@ def cityscapes_camera(width_px: int, height_px: int) -> CameraCalibration:
     )
 
 
-def ego_from_camera_rotation(calibration: CameraCalibration) -> NDArray[np.float64]:
-    """Return the rotation (3, 3) from the optical frame (right, down, forward) to the vehicle frame."""
-    yaw, pitch, roll = calibration.yaw_rad, calibration.pitch_rad, calibration.roll_rad
-    about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
-    about_y = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
-    about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
-    vehicle_from_optical_axes = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
-    return np.asarray(about_z @ about_y @ about_x @ vehicle_from_optical_axes)
-
-
 @dataclass(frozen=True)
 class View:
     """What a camera sees, one row a pixel, row by row (N = H * W).
@@ -86,7 +76,7 @@ class Camera:
         right = (np.arange(self.width_px) - c.u0_px) / c.fx_px
         down = (np.arange(self.height_px) - c.v0_px) / c.fy_px
         rays = np.stack(np.broadcast_arrays(right[None], down[:, None], 1.0), axis=-1).reshape(-1, 3)
-        return (rays @ ego_from_camera_rotation(c).T).astype(np.float32)
+        return (rays @ c.ego_from_optical.rotation.T).astype(np.float32)
 
     @cached_property
     def origin_ego_m(self) -> NDArray[np.float64]:

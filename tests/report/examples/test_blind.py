@@ -7,13 +7,14 @@ from support.toy_world import street
 
 from semgrid_eval.arrays import read_arrays
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.grids.geometry import unit_projection
-from semgrid_eval.grids.spec import GridConfig, Sensor
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.report.examples.blind import blind_cells
 from semgrid_eval.report.examples.kept import Glimpses
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.results import WindowRecord, windows_file
-from semgrid_eval.scores.thumbnails import Drive
+from semgrid_eval.scores.thumbnails import Track
+from semgrid_eval.sensors.camera import CameraSensor
+from semgrid_eval.sensors.projection import unit_projection
 
 GROUND = [CLASS_NAMES.index(name) for name in ("road", "sidewalk")]
 SPLIT = ("split2_upper", "split2_lower")
@@ -23,11 +24,11 @@ WINDOW = WindowRecord(
 )
 
 
-def drive(*poses):
-    """A drive whose camera is that of the toy streets; it stands still unless poses are given."""
-    track = np.array(poses or [(0.0, 0.0, 0.0)] * 3)
+def track(*poses):
+    """A track whose camera is that of the toy streets; it stands still unless poses are given."""
+    known = np.array(poses or [(0.0, 0.0, 0.0)] * 3)
     projection = unit_projection(street().calibration(), (256, 128))
-    return Drive(0, np.arange(len(track)) * 1_000, track, projection)
+    return Track(0, np.arange(len(known)) * 1_000, known, projection)
 
 
 def shrunk(flags, cells):
@@ -41,7 +42,7 @@ def test_ground_in_blind_cells_is_in_no_input_but_in_the_target(seen, place):
     window = row.shown.record.windows[place]
     arrays = read_arrays(windows_file(seen, row.shown.record.windows_id), ("inputs", "target"))
     known = Glimpses(run).of(window.log, row.shown)
-    blind = blind_cells(known.drive, GridConfig(), SPLIT, window)
+    blind = blind_cells(known.track, GridConfig(), SPLIT, window)
     inside = shrunk(blind, 2)  # cells at the edge are partly seen, and morphology spreads them
     inputs, target = np.isin(arrays["inputs"][place], GROUND).any(axis=(0, 1)), np.isin(arrays["target"][place], GROUND)
     assert (inputs & ~blind).sum() > 100
@@ -50,7 +51,7 @@ def test_ground_in_blind_cells_is_in_no_input_but_in_the_target(seen, place):
 
 
 def test_a_far_wide_band_and_both_margins_are_blind_on_a_standing_vehicle():
-    blind = blind_cells(drive(), GridConfig(), SPLIT, WINDOW)
+    blind = blind_cells(track(), GridConfig(), SPLIT, WINDOW)
     ahead = np.flatnonzero(blind[:, 64])  # straight ahead
     assert (np.diff(ahead) == 1).all()
     # rows 125 to 145 of 256, the camera 1.22 m up and tilted by 0.038: by hand 16.9 to 35.2 m, 1.7 m more from the axle
@@ -63,21 +64,21 @@ def test_a_far_wide_band_and_both_margins_are_blind_on_a_standing_vehicle():
 
 
 def test_sensors_that_share_the_image_leave_nothing_blind():
-    assert not blind_cells(drive(), GridConfig(), ("split1_upper", "split1_lower"), WINDOW).any()
+    assert not blind_cells(track(), GridConfig(), ("split1_upper", "split1_lower"), WINDOW).any()
 
 
 def test_driving_on_moves_the_band_nearer_by_the_way_driven():
-    standing = blind_cells(drive(), GridConfig(), SPLIT, WINDOW)
+    standing = blind_cells(track(), GridConfig(), SPLIT, WINDOW)
     way_m = 10 * 100 / 128  # ten cells between the inputs, which are seen from one place, and the target
-    moved = blind_cells(drive((0, 0, 0), (0, 0, 0), (way_m, 0, 0)), GridConfig(), SPLIT, WINDOW)
+    moved = blind_cells(track((0, 0, 0), (0, 0, 0), (way_m, 0, 0)), GridConfig(), SPLIT, WINDOW)
     np.testing.assert_array_equal(moved[10:], standing[:-10])
 
 
 def test_grids_keep_the_orientation_of_their_first_frame():
     turned = [(0.0, 0.0, 0.1), (0.0, 0.0, 0.1), (0.0, 0.0, 0.1)]
-    straight = blind_cells(drive(), GridConfig(), SPLIT, WINDOW)
-    np.testing.assert_array_equal(blind_cells(drive(*turned), GridConfig(), SPLIT, WINDOW), straight)
-    later = blind_cells(drive((0.0, 0.0, 0.0), *turned[1:]), GridConfig(), SPLIT, WINDOW)
+    straight = blind_cells(track(), GridConfig(), SPLIT, WINDOW)
+    np.testing.assert_array_equal(blind_cells(track(*turned), GridConfig(), SPLIT, WINDOW), straight)
+    later = blind_cells(track((0.0, 0.0, 0.0), *turned[1:]), GridConfig(), SPLIT, WINDOW)
     # Row 60 is 53 m ahead, where a turn of 0.1 to the left is 6.8 cells, and a little more at the margins of the image.
     assert -10 < centre_column(later[60]) - centre_column(straight[60]) < -6
 
@@ -87,13 +88,21 @@ def centre_column(flags):
 
 
 def test_without_times_or_for_unknown_sensors_nothing_is_said():
-    assert blind_cells(drive(), GridConfig(), SPLIT, WINDOW.model_copy(update={"input_stamps_ns": ()})) is None
-    assert blind_cells(drive(), GridConfig(), SPLIT, WINDOW.model_copy(update={"target_stamp_ns": 7})) is None
-    assert blind_cells(drive(), GridConfig(), ("gone",), WINDOW) is None
+    assert blind_cells(track(), GridConfig(), SPLIT, WINDOW.model_copy(update={"input_stamps_ns": ()})) is None
+    assert blind_cells(track(), GridConfig(), SPLIT, WINDOW.model_copy(update={"target_stamp_ns": 7})) is None
+    assert blind_cells(track(), GridConfig(), ("gone",), WINDOW) is None
 
 
 def test_a_camera_that_looks_back_sees_nothing_ahead():
-    known = drive()
+    known = track()
     back = dataclasses.replace(known, projection=-known.projection)
-    crops = (Sensor(name="small", bottom_px=10, right_px=10),)
+    crops = {"full": CameraSensor(), "small": CameraSensor(bottom_px=10, right_px=10)}
     assert not blind_cells(back, GridConfig(sensors=crops), ("small",), WINDOW).any()
+
+
+def test_nothing_is_said_of_what_another_camera_sees():
+    lower = CameraSensor(camera="front", top_px=145)
+    sensors = {"full": CameraSensor(camera="front"), "lower": lower, "left": CameraSensor(camera="left")}
+    grid = GridConfig(sensors=sensors)
+    assert blind_cells(track(), grid, ("lower",), WINDOW).any()
+    assert blind_cells(track(), grid, ("lower", "left"), WINDOW) is None

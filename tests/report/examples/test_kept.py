@@ -20,8 +20,9 @@ def test_what_was_not_kept_is_none(seen):
     kept, result = opened(seen)
     assert kept.of("val/another.mcap", result) is None
     assert kept.of("val/toy0.mcap", result) is not None
-    rear = replace(result, record=result.record.model_copy(update={"config": {"grid": {"camera": "rear"}}}))
-    assert kept.of("val/toy0.mcap", rear) is None
+    config = {"grid": {"sensors": {"full": {"camera": "rear"}}}}
+    rear = replace(result, record=result.record.model_copy(update={"config": config}))
+    assert opened(seen)[0].of("val/toy0.mcap", rear) is None
 
 
 def test_a_log_to_train_on_may_have_the_same_path_as_one_to_score(seen, tmp_path):

@@ -16,7 +16,7 @@ def with_config(result, **config):
 
 
 def test_the_grids_of_a_result_are_known_where_it_tells(result):
-    grid = GridConfig(camera="rear")
+    grid = GridConfig(target=("split1_upper",))
     assert with_config(result, grid=grid.model_dump(mode="json")).grid == grid
     assert with_config(result, grid={"cells": 3}).grid is None
     assert result.grid is None

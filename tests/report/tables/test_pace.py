@@ -7,6 +7,7 @@ import pytest
 from support.fake_run import FRAME_NS, FakeRow, make_fake_run
 
 from semgrid_eval.files import digest_value
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.report.estimates.bootstrap import score_rows
 from semgrid_eval.report.page.write import write_report
 from semgrid_eval.report.rows.load import load_runs
@@ -19,30 +20,30 @@ from semgrid_eval.report.tables.pace import (
     score_paces,
 )
 from semgrid_eval.scores.iou import class_iou
-from semgrid_eval.scores.thumbnails import Drive, LogPictures, pictures_file, write_pictures
+from semgrid_eval.scores.thumbnails import LogPictures, Track, pictures_file, write_pictures
 
 ROWS = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 2))
 SPEEDS_MPS = (0.2, 2.0, 6.0, 12.0, 6.5)
 STEP_S = FRAME_NS * 1e-9
 
 
-def drive(speed_mps, *, frames=30):
+def track(speed_mps, *, frames=30):
     """A drive that begins at rest and has its speed from the tenth frame on, up and to the left."""
     way_m = np.maximum(np.arange(frames) - 10, 0) * STEP_S * speed_mps
-    track = np.stack([0.6 * way_m, 0.8 * way_m, np.zeros(frames)], axis=1)
-    return Drive(0, np.arange(frames) * FRAME_NS, track, np.zeros((3, 4)))
+    poses = np.stack([0.6 * way_m, 0.8 * way_m, np.zeros(frames)], axis=1)
+    return Track(0, np.arange(frames) * FRAME_NS, poses, np.zeros((3, 4)))
 
 
-def made(folder, drives):
+def made(folder, tracks):
     run = make_fake_run(folder / "run", rows=ROWS, recordings=len(SPEEDS_MPS), windows=1)
-    for i, known in enumerate(drives):
-        write_pictures(pictures_file(run, digest_value(f"town_{i:03d}"), None), LogPictures(known))
+    for i, known in enumerate(tracks):
+        write_pictures(pictures_file(run, digest_value(f"town_{i:03d}"), GridConfig()), LogPictures(known))
     return load_runs([run])
 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    return made(tmp_path_factory.mktemp("paces"), [drive(speed) for speed in SPEEDS_MPS])
+    return made(tmp_path_factory.mktemp("paces"), [track(speed) for speed in SPEEDS_MPS])
 
 
 def scored(runs):
@@ -50,9 +51,9 @@ def scored(runs):
 
 
 def test_speed_is_the_straight_way_over_the_time():
-    assert mean_speed_mps(drive(5.0), 15 * FRAME_NS, 20 * FRAME_NS) == pytest.approx(5.0)
-    assert mean_speed_mps(drive(5.0), 15 * FRAME_NS, int(16.5 * FRAME_NS)) == pytest.approx(5.0, rel=1e-6)
-    assert mean_speed_mps(drive(5.0), 0, 20 * FRAME_NS) == pytest.approx(2.5)
+    assert mean_speed_mps(track(5.0), 15 * FRAME_NS, 20 * FRAME_NS) == pytest.approx(5.0)
+    assert mean_speed_mps(track(5.0), 15 * FRAME_NS, int(16.5 * FRAME_NS)) == pytest.approx(5.0, rel=1e-6)
+    assert mean_speed_mps(track(5.0), 0, 20 * FRAME_NS) == pytest.approx(2.5)
 
 
 def test_each_window_counts_at_its_own_pace(runs):
@@ -86,9 +87,9 @@ def test_tables_have_a_column_for_each_pace_and_score(runs):
     assert len(tables["pace_differences"].bodies) == 1
 
 
-@pytest.mark.parametrize("drives", [[], [drive(3.0, frames=0)] * 2], ids=["none kept", "no frame"])
-def test_a_run_that_knows_no_drive_says_so(tmp_path, drives):
-    runs = made(tmp_path, drives)
+@pytest.mark.parametrize("tracks", [[], [track(3.0, frames=0)] * 2], ids=["none kept", "no frame"])
+def test_a_run_that_knows_no_drive_says_so(tmp_path, tracks):
+    runs = made(tmp_path, tracks)
     assert scored(runs) == {}
     assert set(pace_tables({}).values()) == {None}
     page = write_report(tmp_path / "run")
@@ -97,7 +98,7 @@ def test_a_run_that_knows_no_drive_says_so(tmp_path, drives):
 
 
 def test_a_log_whose_drive_is_unknown_is_left_out(tmp_path):
-    paces = scored(made(tmp_path, [drive(6.0), drive(6.0)]))
+    paces = scored(made(tmp_path, [track(6.0), track(6.0)]))
     assert list(paces) == ["4 to 8 m/s"]
     assert paces["4 to 8 m/s"]["BL-DC"].row.windows == 2
 

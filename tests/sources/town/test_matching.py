@@ -4,7 +4,7 @@ import pytest
 from support.cameras import calibration
 
 from semgrid_eval.sources.town.matching import StereoMatcher, right_of
-from semgrid_eval.sources.town.sensors import Camera, cityscapes_camera, ego_from_camera_rotation
+from semgrid_eval.sources.town.sensors import Camera, cityscapes_camera
 
 CAMERA = Camera(cityscapes_camera(512, 256), 512, 256)
 
@@ -49,5 +49,5 @@ def test_the_pair_is_the_camera_with_a_margin_and_its_right_neighbour():
 
 def test_the_right_camera_is_a_baseline_away_along_the_rows():
     camera = Camera(calibration(roll_rad=0.05, pitch_rad=0.1, yaw_rad=0.3), 64, 32)
-    away_m = ego_from_camera_rotation(camera.calibration).T @ (right_of(camera).origin_ego_m - camera.origin_ego_m)
+    away_m = camera.calibration.ego_from_optical.rotation.T @ (right_of(camera).origin_ego_m - camera.origin_ego_m)
     assert away_m == pytest.approx([0.209, 0.0, 0.0], abs=1e-12)

@@ -7,12 +7,13 @@ from typing import NamedTuple
 from google.protobuf.message import Message
 
 from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import codec, topics
-from semgrid_eval.log.motion import DeadReckoning
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.png import read_header
 from semgrid_eval.recording.types import Pose
+from semgrid_eval.sensors.camera import frame_poses
 
 _PICTURES = (topics.IMAGE, topics.LABEL)
 
@@ -27,23 +28,25 @@ class Outgoing(NamedTuple):
     notes: dict[str, str] | None = None
 
 
-class Drive:
-    """The drive that a log holds.
+class Backdrop:
+    """What surrounds the grids of a log.
 
     Args:
         log: the open log.
-        camera: whose frames count; None takes a log's only one.
+        grid: how its grids were made; frames are those of the camera that leads the target.
 
     Raises:
+        InputError: no camera leads the target.
         LogError: the log is damaged, or has no such camera.
     """
 
-    def __init__(self, log: LogReader, camera: str | None = None) -> None:
+    def __init__(self, log: LogReader, grid: GridConfig) -> None:
+        if grid.camera is None:
+            raise InputError(f"frames of {grid.target[0]!r}, which is not a camera, cannot be found", path=log.path)
         self.cameras = log.scene.cameras
-        chosen = log.choose_camera(camera)
         self._log = log
         self._calibrations = {name: log.calibration(name) for name in self.cameras}
-        self._poses = drive_poses(log, chosen)
+        self._poses = frame_poses(log, grid.camera, grid.integrator)
         self._frames = {pose.stamp_ns: frame for frame, pose in enumerate(self._poses)}
 
     def frame_at(self, stamp_ns: int) -> int:
@@ -102,19 +105,3 @@ class Drive:
         except InputError as error:
             raise LogError(str(error), path=self._log.path, field=topic) from error
         return header.width, header.height
-
-
-def drive_poses(log: LogReader, camera: str) -> list[Pose]:
-    """Return the vehicle's pose in the odom frame at each frame of a camera, from the motion known by then.
-
-    Raises:
-        LogError: what is read is damaged.
-    """
-    poses: list[Pose] = []
-    reckoning, samples, known = DeadReckoning(), log.motion(), 0
-    for _, stamp_ns, _ in log.messages([camera_topic(camera, topics.DISPARITY)]):
-        while known < len(samples) and samples[known].stamp_ns <= stamp_ns:
-            reckoning.add(samples[known])
-            known += 1
-        poses.append(reckoning.pose_at(stamp_ns))
-    return poses

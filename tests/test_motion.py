@@ -7,12 +7,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.grids.motion import integrate_motion
-from semgrid_eval.recording.types import MotionSample
+from semgrid_eval.motion import EgoMotion, MotionSample, Pose
+
+S = 1_000_000_000
 
 
 def samples_of(stamps_ns, speeds, yaw_rates):
     return [MotionSample(int(t), float(v), float(w)) for t, v, w in zip(stamps_ns, speeds, yaw_rates, strict=True)]
+
+
+def integrate_motion(samples, times_ns, integrator="euler"):
+    """Positions (F, 2) and yaw (F,) against the first of the times."""
+    motion = EgoMotion(samples, integrator)
+    poses = [motion.odom_from_vehicle(int(stamp_ns)) for stamp_ns in times_ns]
+    seen = [pose.seen_from(poses[0]) for pose in poses]
+    return np.array([(pose.x_m, pose.y_m) for pose in seen]), np.array([pose.yaw_rad for pose in seen])
 
 
 def slow_euler(samples):
@@ -71,9 +80,45 @@ def test_first_time_is_the_origin_even_after_a_turn():
     np.testing.assert_allclose(yaw_rad, 0, atol=1e-12)
 
 
-def test_frames_far_outside_the_motion_are_refused():
-    samples = samples_of([0, 10**8], [1, 1], [0, 0])
+def test_times_far_outside_the_motion_are_refused():
+    motion = EgoMotion(samples_of([0, 10**8], [1, 1], [0, 0]))
+    motion.check_cover(3 * 10**8)
     with pytest.raises(InputError, match=r"0\.400 s outside"):
-        integrate_motion(samples, np.array([0, 5 * 10**8]))
+        motion.check_cover(5 * 10**8)
     with pytest.raises(InputError, match="no motion samples"):
-        integrate_motion([], np.array([0]))
+        EgoMotion().check_cover(0)
+
+
+def test_nothing_moves_without_samples():
+    assert EgoMotion().pose_at(5) == Pose(5, 0.0, 0.0, 0.0)
+
+
+def test_a_speed_moves_over_the_time_after_its_sample_and_a_yaw_rate_turns_over_the_time_before():
+    motion = EgoMotion(samples_of([0, 2 * S, 4 * S], [3.0, 0.0, 0.0], [99.0, 0.25, -0.5]))
+    assert motion.pose_at(S) == Pose(S, 3.0, 0.0, 0.25)
+    assert motion.pose_at(2 * S) == Pose(2 * S, 6.0, 0.0, 0.5)
+    assert motion.pose_at(3 * S) == Pose(3 * S, 6.0, 0.0, 0.0)
+
+
+def test_left_turn_leads_to_the_left():
+    pose = EgoMotion(samples_of([0, S], [2.0, 2.0], [0.0, math.pi / 2])).pose_at(2 * S)
+    assert (pose.x_m, pose.y_m) == pytest.approx((2.0, 2.0))
+
+
+@pytest.mark.parametrize("integrator", ["euler", "arc"])
+def test_rates_are_held_before_the_first_and_after_the_last_sample(integrator):
+    motion = EgoMotion(samples_of([10 * S, 11 * S], [2.0, 4.0], [0.0, 0.0]), integrator)
+    begin, end = motion.pose_at(10 * S), motion.pose_at(11 * S)
+    assert begin.x_m - motion.pose_at(9 * S).x_m == pytest.approx(2.0)
+    assert motion.pose_at(13 * S).x_m - end.x_m == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize("integrator", ["euler", "arc"])
+@given(rows=steps)
+def test_motion_known_up_to_now_leads_to_where_the_whole_of_it_does(integrator, rows):
+    stamps_ns = np.cumsum([row[0] for row in rows])
+    samples = samples_of(stamps_ns, [row[1] for row in rows], [row[2] for row in rows])
+    whole, so_far = EgoMotion(samples, integrator), EgoMotion((), integrator)
+    for sample in samples:
+        so_far.add(sample)
+        assert so_far.pose_at(sample.stamp_ns) == whole.pose_at(sample.stamp_ns)

@@ -1,0 +1,96 @@
+"""The grids of one recording, and the file that keeps those of a log."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.arrays import read_arrays, write_arrays
+
+FORMAT_VERSION = 3
+
+_ALONG_FRAMES = {"stamps_ns": 0, "grids": 1, "position_m": 0, "yaw_rad": 0}
+"""Arrays of a recording, and the axis of their frames."""
+
+
+@dataclass(frozen=True)
+class GridRecording:
+    """The grids of one recording, all in the orientation of its first frame (reading 18).
+
+    Args:
+        name: of the recording; the stretches of a longer log are told apart by `#1`, `#2`, ...
+        log: path of its log.
+        digest: of the log.
+        split: `train`, `val` or `test`.
+        dataset: where it comes from.
+        sensors: names, in the order of `grids`; a target of several sensors is one of them.
+        target: which of them the targets come from.
+        stamps_ns: (F,) times of the first of the target's sensors.
+        grids: (S, F, H, W) uint8 class ids; each grid is centred on the vehicle at its own time.
+        position_m: (F, 2) of the vehicle, forward and left of the first frame.
+        yaw_rad: (F,) heading against the first frame.
+        actors: (F, H, W) uint8, where true actors stand at each frame's time: bits `STANDING` and `MOVING` of the
+            grid's spec; None where the log does not hold the truth.
+        group: the town, city or drive that the log belongs to; empty where it does not say.
+    """
+
+    name: str
+    log: str
+    digest: str
+    split: str
+    dataset: str
+    sensors: tuple[str, ...]
+    target: str
+    stamps_ns: NDArray[np.int64]
+    grids: NDArray[np.uint8]
+    position_m: NDArray[np.float64]
+    yaw_rad: NDArray[np.float64]
+    actors: NDArray[np.uint8] | None = None
+    group: str = ""
+
+
+def write_recordings(path: Path, recordings: Sequence[GridRecording]) -> None:
+    """Write the grids of a log's stretches, one after the other along their frames."""
+    first = recordings[0]
+    truth = [recording.actors for recording in recordings if recording.actors is not None]
+    arrays: dict[str, NDArray[np.generic]] = {
+        "log": np.array([first.digest, first.split, first.dataset, first.group, first.target]),
+        "sensors": np.array(first.sensors),
+        "names": np.array([recording.name for recording in recordings]),
+        "frames": np.array([len(recording.stamps_ns) for recording in recordings]),
+        "has_truth": np.array([recording.actors is not None for recording in recordings]),
+    }
+    for name, axis in _ALONG_FRAMES.items():
+        arrays[name] = np.concatenate([getattr(recording, name) for recording in recordings], axis=axis)
+    arrays["actors"] = np.concatenate(truth) if truth else np.zeros((0, *first.grids.shape[2:]), np.uint8)
+    write_arrays(path, arrays)
+
+
+def read_recordings(path: Path, log: Path) -> list[GridRecording]:
+    """Read the grids of a log's stretches in one pass.
+
+    Raises:
+        ResultError: the file is missing, damaged or lacks an array.
+    """
+    arrays = read_arrays(path, ("log", "sensors", "names", "frames", "has_truth", *_ALONG_FRAMES, "actors"))
+    digest, split, dataset, group, target = (str(value) for value in arrays["log"])
+    ends, has_truth = np.cumsum(arrays["frames"])[:-1], arrays["has_truth"]
+    parts = {name: np.split(arrays[name], ends, axis=axis) for name, axis in _ALONG_FRAMES.items()}
+    truth = iter(np.split(arrays["actors"], np.cumsum(arrays["frames"][has_truth])))
+    return [
+        GridRecording(
+            name=str(name),
+            log=str(log),
+            digest=digest,
+            split=split,
+            dataset=dataset,
+            group=group,
+            sensors=tuple(str(sensor) for sensor in arrays["sensors"]),
+            target=target,
+            actors=next(truth) if has_truth[number] else None,
+            **{key: stretches[number] for key, stretches in parts.items()},
+        )
+        for number, name in enumerate(arrays["names"])
+    ]

@@ -1,0 +1,125 @@
+"""Cameras with disparity and labels: a rectangle of the image is a sensor."""
+
+import heapq
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from semgrid_eval.errors import LogError
+from semgrid_eval.log.topics import DISPARITY, camera_topic
+from semgrid_eval.motion import EgoMotion, Integrator, Pose
+from semgrid_eval.sensors.sensor import Points, SensorConfig
+
+if TYPE_CHECKING:
+    from semgrid_eval.log.store import LogReader
+    from semgrid_eval.recording.types import CameraFrame
+
+_SIZE_PX = (16, 8192)
+
+
+class CameraSensor(SensorConfig):
+    """A rectangle of a camera's image, in pixels of the resized image, ends exclusive.
+
+    Args:
+        camera: its name in the log; None takes a log's only one.
+        image_size_px: width and height to which labels and disparity are brought before projection (reading 22).
+        top_px: first row.
+        bottom_px: end of the rows; None reaches to the edge.
+        left_px: first column.
+        right_px: end of the columns; None reaches to the edge.
+    """
+
+    kind: Literal["camera"] = "camera"
+    camera: str | None = None
+    image_size_px: tuple[int, int] = (512, 256)
+    top_px: int = Field(0, ge=0)
+    bottom_px: int | None = None
+    left_px: int = Field(0, ge=0)
+    right_px: int | None = None
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        width, height = self.image_size_px
+        least, most = _SIZE_PX
+        if not (least <= width <= most and least <= height <= most):
+            raise ValueError(f"image_size_px {width} x {height} is outside {least} to {most}")
+        top, bottom, left, right = self.crop_px
+        if bottom <= top or right <= left:
+            raise ValueError("it covers no pixel")
+        if bottom > height or right > width:
+            raise ValueError(f"it reaches beyond the image of {width} x {height} px")
+        return self
+
+    @property
+    def crop_px(self) -> tuple[int, int, int, int]:
+        """Top, bottom, left and right of the rectangle."""
+        width, height = self.image_size_px
+        bottom = height if self.bottom_px is None else self.bottom_px
+        right = width if self.right_px is None else self.right_px
+        return self.top_px, bottom, self.left_px, right
+
+    @property
+    def is_whole_image(self) -> bool:
+        """Whether the rectangle is the whole image."""
+        width, height = self.image_size_px
+        return self.crop_px == (0, height, 0, width)
+
+    def is_of(self, other: "CameraSensor") -> bool:
+        """Tell whether both are parts of one camera's image; who names no camera means a log's only one."""
+        return self.camera == other.camera or None in (self.camera, other.camera)
+
+
+def read_cameras(
+    log: "LogReader", sensors: Mapping[str, CameraSensor], class_by_label: NDArray[np.uint8]
+) -> Iterator[Points]:
+    """Iterate over what parts of cameras' images see, each image decoded once.
+
+    Raises:
+        LogError: there is no such camera, what is read is damaged, or a frame has no labels.
+    """
+    by_camera: dict[str, dict[str, CameraSensor]] = {}
+    for name, sensor in sensors.items():
+        by_camera.setdefault(log.choose_camera(sensor.camera), {})[name] = sensor
+    streams = [_read_camera(log, camera, parts, class_by_label) for camera, parts in by_camera.items()]
+    return heapq.merge(*streams, key=lambda points: points.stamp_ns)
+
+
+def frame_poses(log: "LogReader", sensor: CameraSensor, integrator: Integrator) -> list[Pose]:
+    """Return the vehicle's pose in the odom frame at each of the camera's frames.
+
+    Raises:
+        LogError: there is no such camera, or what is read is damaged.
+    """
+    topic = camera_topic(log.choose_camera(sensor.camera), DISPARITY)
+    motion = EgoMotion(log.motion(), integrator)
+    return [motion.pose_at(stamp_ns) for _, stamp_ns, _ in log.messages([topic])]
+
+
+def _read_camera(
+    log: "LogReader", camera: str, sensors: Mapping[str, CameraSensor], class_by_label: NDArray[np.uint8]
+) -> Iterator[Points]:
+    # Whoever reads settings alone does not wait for a compiler.
+    from semgrid_eval.recording.png import decode_gray
+    from semgrid_eval.sensors.projection import Projection
+
+    sizes_px = dict.fromkeys(sensor.image_size_px for sensor in sensors.values())
+    projections = {size_px: Projection(log.calibration(camera), size_px, class_by_label) for size_px in sizes_px}
+    for frame in log.frames(camera):
+        disparity, label = decode_gray(frame.disparity_png, bit_depth=16), decode_gray(_label_png(frame), bit_depth=8)
+        seen = {size_px: projection.points(disparity, label) for size_px, projection in projections.items()}
+        for name, sensor in sensors.items():
+            top, bottom, left, right = sensor.crop_px
+            pixels, part = seen[sensor.image_size_px], np.s_[top:bottom, left:right]
+            yield Points(name, frame.stamp_ns, pixels.forward_m[part], pixels.left_m[part], pixels.class_id[part])
+
+
+def _label_png(frame: "CameraFrame") -> bytes:
+    if not frame.label_png:
+        raise LogError(
+            "has no label image; add labels to the log (convert cityscapes --labels DIR)",
+            field=f"frame at {frame.stamp_ns} ns",
+        )
+    return frame.label_png

@@ -1,0 +1,65 @@
+"""What every kind of sensor shares: settings in a grid's configuration, and the labelled points that it gives."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from semgrid_eval.config import Config
+
+if TYPE_CHECKING:  # whoever reads settings alone needs no reader of logs
+    from semgrid_eval.log.store import LogReader
+
+
+class SensorConfig(Config):
+    """Settings that sensors of all kinds have.
+
+    Args:
+        kind: one of `semgrid_eval.sensors.kinds.KINDS`.
+        max_age_s: how old an observation may be at the time of a grid; an older one is left out.
+    """
+
+    kind: str
+    max_age_s: float = Field(0.2, ge=0.0, le=10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """What one sensor saw at one time.
+
+    The arrays have one shape, (N,) or, for images, (H, W).
+
+    Args:
+        sensor: its name in the grid's configuration.
+        stamp_ns: when the points were seen.
+        forward_m: float64, in the vehicle frame of that time (ISO 8855, origin on the ground under the rear axle).
+        left_m: likewise.
+        class_id: uint8 grid class, `NO_POINT` for what is not counted.
+    """
+
+    sensor: str
+    stamp_ns: int
+    forward_m: NDArray[np.float64]
+    left_m: NDArray[np.float64]
+    class_id: NDArray[np.uint8]
+
+
+ReadPoints = Callable[["LogReader", Mapping[str, Any], NDArray[np.uint8]], Iterator[Points]]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of sensor.
+
+    Args:
+        config: class of its settings.
+        read: takes an open log, the settings of all sensors of the kind by name, and the table (256,) from label id to
+            grid class, and iterates over all that they saw in the order of time. Sensors that share data come together,
+            so that it is read and decoded once.
+    """
+
+    config: type[SensorConfig]
+    read: ReadPoints

@@ -1,0 +1,52 @@
+"""Brings the observations of several sensors, each with times of its own, to the times of one of them."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from semgrid_eval.sensors.sensor import Points, SensorConfig
+
+TOLERANCE_NS = 1_000_000
+"""Cameras that are triggered together do not stamp alike: what is this much later is taken for simultaneous."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What all sensors have seen last at a time; a sensor without a recent observation is left out.
+
+    Args:
+        stamp_ns: the time.
+        points: by sensor, each with the time of its own.
+    """
+
+    stamp_ns: int
+    points: Mapping[str, Points]
+
+
+def see_together(observations: Iterable[Points], sensors: Mapping[str, SensorConfig], leader: str) -> Iterator[Sight]:
+    """Iterate over the times of the leading sensor with the newest observation that each sensor had made by then.
+
+    Args:
+        observations: of all sensors, in the order of time.
+        sensors: settings by name, which say how old an observation may be.
+        leader: name of the sensor whose times count.
+    """
+    newest: dict[str, Points] = {}
+    now: Points | None = None
+    for points in observations:
+        if now is not None and (points.sensor == leader or points.stamp_ns > now.stamp_ns + TOLERANCE_NS):
+            yield _sight(now, newest, sensors)
+            now = None
+        newest[points.sensor] = points
+        if points.sensor == leader:
+            now = points
+    if now is not None:
+        yield _sight(now, newest, sensors)
+
+
+def _sight(now: Points, newest: Mapping[str, Points], sensors: Mapping[str, SensorConfig]) -> Sight:
+    recent = {
+        name: points
+        for name, points in newest.items()
+        if now.stamp_ns - points.stamp_ns <= sensors[name].max_age_s * 1e9
+    }
+    return Sight(now.stamp_ns, recent)

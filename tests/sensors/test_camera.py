@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+from support.driving import driving
+from support.toy_world import Mount, street
+
+from semgrid_eval.classes import NO_POINT, class_map
+from semgrid_eval.errors import LogError
+from semgrid_eval.log.store import LogReader, write_log
+from semgrid_eval.motion import EgoMotion
+from semgrid_eval.recording import png
+from semgrid_eval.sensors.camera import CameraSensor, frame_poses, read_cameras
+
+
+@pytest.fixture
+def log(tmp_path):
+    cameras = {"front": Mount(), "left": Mount(1.5, 20_000_000)}
+    write_log(street(1, frames=3, cameras=cameras).recording(), tmp_path / "toy.mcap")
+    with LogReader(tmp_path / "toy.mcap") as reader:
+        yield reader
+
+
+def read(log, **sensors):
+    return list(read_cameras(log, sensors, class_map()))
+
+
+def test_a_part_of_an_image_holds_the_points_of_its_pixels_alone(log):
+    part = CameraSensor(camera="front", top_px=100, bottom_px=180, left_px=7, right_px=300)
+    whole, some = read(log, whole=CameraSensor(camera="front"), some=part)[:2]
+    assert (whole.sensor, some.sensor, whole.stamp_ns) == ("whole", "some", some.stamp_ns)
+    assert (whole.class_id != NO_POINT).sum() > (some.class_id != NO_POINT).sum() > 1000
+    for name in ("forward_m", "left_m", "class_id"):
+        np.testing.assert_array_equal(getattr(some, name), getattr(whole, name)[100:180, 7:300])
+
+
+def test_cameras_come_in_the_order_of_time_and_images_are_decoded_once(log, monkeypatch):
+    decoded = []
+    decode = png.decode_gray
+    monkeypatch.setattr(png, "decode_gray", lambda *args, **kinds: decoded.append(1) or decode(*args, **kinds))
+    front, left = CameraSensor(camera="front"), CameraSensor(camera="left")
+    points = read(log, a=front, b=CameraSensor(camera="front", image_size_px=(256, 128)), c=left, d=left)
+    assert [each.sensor for each in points] == [*"abcd"] * 3
+    assert [each.stamp_ns for each in points] == sorted(each.stamp_ns for each in points)
+    assert points[2].stamp_ns - points[0].stamp_ns == 20_000_000
+    assert len(decoded) == 2 * 2 * 3, "label and disparity of two cameras and three frames"
+    assert points[1].class_id.shape == (128, 256)
+
+
+def test_a_log_of_several_cameras_wants_a_name_and_a_frame_wants_labels(log, tmp_path):
+    with pytest.raises(LogError, match=r"toy.mcap: camera: \(not given\) is not one of: front, left"):
+        read(log, any=CameraSensor())
+    write_log(driving(), tmp_path / "bare.mcap")
+    with LogReader(tmp_path / "bare.mcap") as bare, pytest.raises(LogError, match="has no label image"):
+        read(bare, any=CameraSensor())
+
+
+def test_poses_are_those_of_the_cameras_own_times(log):
+    poses = frame_poses(log, CameraSensor(camera="left"), "arc")
+    stamps_ns = [frame.stamp_ns for frame in log.frames("left")]
+    motion = EgoMotion(log.motion(), "arc")
+    assert poses == [motion.pose_at(stamp_ns) for stamp_ns in stamps_ns]
+    assert poses[1].x_m > poses[0].x_m > 0
+
+
+def test_parts_belong_together_if_their_camera_is_the_same_or_the_only_one():
+    assert CameraSensor().is_of(CameraSensor(top_px=9))
+    assert CameraSensor(camera="rear").is_of(CameraSensor())
+    assert not CameraSensor(camera="rear").is_of(CameraSensor(camera="front"))
+    assert CameraSensor(bottom_px=256).is_whole_image
+    assert not CameraSensor(bottom_px=255).is_whole_image
