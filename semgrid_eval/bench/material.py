@@ -20,7 +20,8 @@ from semgrid_eval.sources.town.recordings import (
     plan_recordings,
     render_recording,
 )
-from semgrid_eval.windows.data import WindowSet, select_windows, stack_recordings
+from semgrid_eval.windows.data import WindowSet, select_windows
+from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 _CELLS, _CELL_M, _FRAMES, _FRAME_NS = 128, 100 / 128, 30, 58_823_529

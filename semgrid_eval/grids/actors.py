@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import LogError
+from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.spec import MOVING, STANDING, GridSpec
 from semgrid_eval.log.store import LogReader
 from semgrid_eval.log.topics import TRUE_ACTORS
@@ -76,9 +77,7 @@ def boxes_in_grid(actors: Sequence[Actor], pose: Pose, yaw_rad: float) -> Floats
     ]
     boxes = np.array(rows, np.float64)
     turn_rad = yaw_rad - pose.yaw_rad
-    east_m, north_m = boxes[:, 0] - pose.x_m, boxes[:, 1] - pose.y_m
-    boxes[:, 0] = np.cos(turn_rad) * east_m - np.sin(turn_rad) * north_m
-    boxes[:, 1] = np.sin(turn_rad) * east_m + np.cos(turn_rad) * north_m
+    boxes[:, :2] = SE2(0.0, 0.0, turn_rad).apply(boxes[:, :2] - (pose.x_m, pose.y_m))
     boxes[:, 2] += turn_rad
     along_m = np.cos(boxes[:, 2]) * boxes[:, 0] + np.sin(boxes[:, 2]) * boxes[:, 1]
     across_m = np.cos(boxes[:, 2]) * boxes[:, 1] - np.sin(boxes[:, 2]) * boxes[:, 0]

@@ -1,14 +1,12 @@
 """Grids of whole recordings: read a log once, make the grids of every sensor, keep them by digest."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
-from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_eval.errors import LogError, ResultError, SemgridError
 from semgrid_eval.executors import Executor, InProcess, WorkerDied
@@ -91,41 +89,25 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
         LogError: the log is damaged or lacks what a grid needs.
     """
     with LogReader(log) as reader:
-        motion, truth = EgoMotion(reader.motion(), config.integrator), TrueActors(reader, config.spec)
-        observations = read_points(reader, config.sensors, config.class_by_label())
-        sights = see_together(observations, config.sensors, config.target[0])
-        stretches: list[_StretchArrays] = []
-        for first in sights:
-            stretch = _Stretch(motion, config)
-            for sight in chain([first], islice(sights, config.stretch_frames - 1)):
-                stretch.add(sight)
-            if stretches and len(stretch) < config.stretch_frames:
-                break  # the rest of a log that was cut: too short for the windows of the others
-            stretches.append(stretch.arrays(truth))
-        if not stretches:
-            raise LogError(f"sensor {config.target[0]} has no frames", path=log)
-        return [
-            GridRecording(
-                name=f"{reader.scene.name}#{number}" if len(stretches) > 1 else reader.scene.name,
-                log=str(log),
-                digest=reader.digest,
-                split=reader.scene.split,
-                dataset=reader.scene.dataset,
-                group=getattr(reader.scene, "group", ""),
-                sensors=tuple(config.rows),
-                target=config.target_row,
-                **arrays,
-            )
-            for number, arrays in enumerate(stretches, start=1)
-        ]
+        truth = TrueActors(reader, config.spec)
+        found = [stretch.recording(reader, truth) for stretch in _stretches(reader, config)]
+    if not found:
+        raise LogError(f"sensor {config.target[0]} has no frames", path=log)
+    if len(found) == 1:
+        return found
+    return [replace(each, name=f"{each.name}#{number}") for number, each in enumerate(found, start=1)]
 
 
-class _StretchArrays(TypedDict):
-    stamps_ns: NDArray[np.int64]
-    grids: NDArray[np.uint8]
-    position_m: NDArray[np.float64]
-    yaw_rad: NDArray[np.float64]
-    actors: NDArray[np.uint8] | None
+def _stretches(reader: LogReader, config: GridConfig) -> Iterator["_Stretch"]:
+    motion = EgoMotion(reader.motion(), config.integrator)
+    observations = read_points(reader, config.sensors, config.class_by_label())
+    sights = see_together(observations, config.sensors, config.target[0])
+    for number, first in enumerate(sights):
+        stretch = _Stretch(motion, config)
+        for sight in chain([first], islice(sights, config.stretch_frames - 1)):
+            stretch.add(sight)
+        if number == 0 or len(stretch) == config.stretch_frames:
+            yield stretch  # the rest of a log that was cut is too short for the windows of the others
 
 
 class _Stretch:
@@ -148,10 +130,18 @@ class _Stretch:
         rows = [[sight.points[name] for name in names if name in sight.points] for names in self._config.rows.values()]
         self._grids.append(np.stack([self._grid(seen, here) for seen in rows]))
 
-    def arrays(self, truth: TrueActors) -> _StretchArrays:
-        """Return the arrays of a `GridRecording`."""
+    def recording(self, reader: LogReader, truth: TrueActors) -> GridRecording:
+        """Return all frames with what the log says of itself."""
         stamps_ns, yaw_rad = np.array(self._stamps_ns, np.int64), np.array([place.yaw_rad for place in self._places])
-        return _StretchArrays(
+        return GridRecording(
+            name=reader.scene.name,
+            log=str(reader.path),
+            digest=reader.digest,
+            split=reader.scene.split,
+            dataset=reader.scene.dataset,
+            group=getattr(reader.scene, "group", ""),
+            sensors=tuple(self._config.rows),
+            target=self._config.target_row,
             stamps_ns=stamps_ns,
             grids=np.stack(self._grids, axis=1),
             position_m=np.array([(place.x_m, place.y_m) for place in self._places]),

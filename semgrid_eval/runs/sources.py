@@ -16,7 +16,7 @@ from semgrid_eval.progress import Stage
 from semgrid_eval.runs.matrix import Row
 from semgrid_eval.scores.results import LogRecord
 from semgrid_eval.sources.benchmarks import published_fingerprints
-from semgrid_eval.windows.data import GridData, stack_recordings
+from semgrid_eval.windows.grids import GridData, stack_recordings
 
 
 class Sources:

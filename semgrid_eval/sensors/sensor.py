@@ -37,7 +37,7 @@ class Points:
         stamp_ns: when the points were seen.
         forward_m: float64, in the vehicle frame of that time (ISO 8855, origin on the ground under the rear axle).
         left_m: likewise.
-        class_id: uint8 grid class, `NO_POINT` for what is not counted.
+        class_id: uint8 grid class; where it is `NO_POINT` there is nothing, whatever the coordinates say.
     """
 
     sensor: str

@@ -9,7 +9,8 @@ from support.recordings import random_recording, recording
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.baselines import FuseAll, OverlaySensors, RepeatNewest, overlay
-from semgrid_eval.windows.data import WindowBatch, select_windows, stack_recordings
+from semgrid_eval.windows.data import WindowBatch, select_windows
+from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import Window
 
 UPPER, LOWER = "split1_upper", "split1_lower"

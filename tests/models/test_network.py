@@ -21,7 +21,8 @@ from semgrid_eval.models.network import (
     save_network,
     seeded_network,
 )
-from semgrid_eval.windows.data import select_windows, stack_recordings
+from semgrid_eval.windows.data import select_windows
+from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import Window
 
 SMALL = NetworkConfig(depth=3, features=4)

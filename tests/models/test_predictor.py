@@ -8,7 +8,8 @@ from support.recordings import random_recording
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.predictor import ENTRY_POINT_GROUP, CheckedPredictor, load_predictor, one_hot
-from semgrid_eval.windows.data import select_windows, stack_recordings
+from semgrid_eval.windows.data import select_windows
+from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import Window
 
 OWN_MODEL = """

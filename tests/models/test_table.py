@@ -10,7 +10,8 @@ from support.recordings import drifting_blocks, random_recording, recording
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.models.baselines import RepeatNewest
 from semgrid_eval.models.table import GRID_LIMIT, SMOOTHING_CELLS, count_table
-from semgrid_eval.windows.data import select_windows, stack_recordings
+from semgrid_eval.windows.data import select_windows
+from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 

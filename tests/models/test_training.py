@@ -13,7 +13,8 @@ from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.models.checkpoint import CHECKPOINT_FILE, HISTORY_FILE, WEIGHTS_FILE
 from semgrid_eval.models.network import NetworkConfig, NetworkPredictor, load_network
 from semgrid_eval.models.training import DivergedError, TrainingConfig, draw_windows, masked_loss, train
-from semgrid_eval.windows.data import select_windows, stack_recordings
+from semgrid_eval.windows.data import select_windows
+from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 CPU = torch.device("cpu")

@@ -9,7 +9,8 @@ from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.baselines import RepeatNewest
 from semgrid_eval.scores.evaluate import evaluate
-from semgrid_eval.windows.data import select_windows, stack_recordings, window_arrays
+from semgrid_eval.windows.data import select_windows, window_arrays
+from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import WindowConfig, validation_windows
 
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from support.recordings import FRAME_NS, random_recording, recording
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.windows.data import GHOST_S, select_windows, stack_recordings, window_arrays
+from semgrid_eval.windows.data import select_windows, window_arrays
+from semgrid_eval.windows.grids import GHOST_S, stack_recordings
 from semgrid_eval.windows.plan import Window, WindowConfig, training_windows, validation_windows
 from semgrid_eval.windows.shift import covered_without_truth, shift_grids, shift_in_cells
 

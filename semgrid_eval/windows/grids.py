@@ -1,0 +1,145 @@
+"""The grids of all recordings in one block of memory, with where the vehicle and the true actors are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.windows.shift import shift_grids, shift_in_cells
+
+if TYPE_CHECKING:  # building grids needs the log readers; using built ones does not
+    from semgrid_eval.grids.recording import GridRecording
+
+GHOST_S = 1.5
+"""How long an actor's footprints stay near a target.
+
+That holds all ghosts that rows of the paper can leave: five inputs, or a horizon three steps longer, reach back 25
+frames, 1.47 s.
+"""
+
+
+@dataclass(frozen=True)
+class GridData:
+    """The grids of all recordings on one device, recordings one after the other along F.
+
+    Args:
+        grids: (S, F, H, W) uint8 class ids.
+        sensors: names along S.
+        target: which of them the targets come from.
+        recordings: names of the recordings, and `logs` the paths of their logs.
+        digests: of those logs.
+        first_frames: (R + 1,) where each recording begins along F, and F.
+        stamps_ns: (F,) int64.
+        position_m: (F, 2) float64, forward and left in the grid orientation of the frame's own recording.
+        cell_m: edge of a cell.
+        actors: for each recording (its F, H, W) flags of true actors, None where its log does not hold the truth.
+            They stay on the host: scores are split by them, and nothing is predicted from them.
+    """
+
+    grids: Tensor
+    sensors: tuple[str, ...]
+    target: str
+    recordings: tuple[str, ...]
+    logs: tuple[str, ...]
+    digests: tuple[str, ...]
+    first_frames: NDArray[np.int64]
+    stamps_ns: NDArray[np.int64]
+    position_m: NDArray[np.float64]
+    cell_m: float
+    actors: tuple[NDArray[np.uint8] | None, ...] = ()
+
+    def to(self, device: torch.device) -> "GridData":
+        """Return the same data with its grids on another device."""
+        return replace(self, grids=self.grids.to(device))
+
+    @property
+    def frame_counts(self) -> list[int]:
+        """Frames of each recording."""
+        return [int(count) for count in np.diff(self.first_frames)]
+
+    def locate(self, frames: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Find frames, indices along F: (N,) -> the recording of each (N,) and the index of the frame there (N,)."""
+        owners = np.searchsorted(self.first_frames, frames, side="right") - 1
+        return owners, frames - self.first_frames[owners]
+
+    def actors_near(self, target_frames: NDArray[np.int64]) -> NDArray[np.uint8] | None:
+        """Flag where true actors are, or were during the last `GHOST_S`: -> (N, H, W), in the targets' places.
+
+        There a model without any idea of motion may leave a ghost, whichever inputs it has: the flags are those of a
+        target, whatever a row sees. Footprints of all frames of that time are moved by the ego motion, like grids, and
+        are grown by `MARGIN_M`. Targets of recordings without the truth have no flags; None where no recording has it.
+
+        Args:
+            target_frames: (N,) indices along F.
+        """
+        if all(flags is None for flags in self.actors):
+            return None
+        found = np.zeros((len(target_frames), *self.grids.shape[-2:]), np.uint8)
+        for result, target, owner in zip(found, target_frames, self.locate(target_frames)[0], strict=True):
+            if (flags := self.actors[owner]) is not None:
+                begin = self.first_frames[owner]
+                age_s = (self.stamps_ns[target] - self.stamps_ns[begin : target + 1]) * 1e-9
+                first = begin + int(np.argmax(age_s <= GHOST_S))
+                moved_m = self.position_m[target] - self.position_m[first : target + 1]
+                shift_cells = torch.from_numpy(shift_in_cells(moved_m, self.cell_m))
+                seen = torch.from_numpy(flags[first - begin : target + 1 - begin])
+                np.bitwise_or.reduce(shift_grids(seen, shift_cells).numpy(), axis=0, out=result)
+        return found
+
+    def sensor_index(self, name: str) -> int:
+        """Find a sensor.
+
+        Raises:
+            InputError: the grids have no such sensor.
+        """
+        if name not in self.sensors:
+            raise InputError(f"the grids have no sensor {name!r}, only {', '.join(self.sensors)}", field="sensors")
+        return self.sensors.index(name)
+
+
+def stack_recordings(
+    recordings: Sequence["GridRecording"], *, cell_m: float, sensors: Sequence[str] | None = None
+) -> GridData:
+    """Put recordings into one block of memory; `sensors` limits it to those and the target's (default: all).
+
+    Raises:
+        InputError: there is no recording, or one lacks a sensor or has grids of another size.
+    """
+    if not recordings:
+        raise InputError("there are no grids to take windows from")
+    target = recordings[0].target
+    kept = tuple(dict.fromkeys([*(sensors or recordings[0].sensors), target]))
+    size = recordings[0].grids.shape[-2:]
+    first_frames = np.concatenate([[0], np.cumsum([len(entry.stamps_ns) for entry in recordings])]).astype(np.int64)
+    grids = torch.empty((len(kept), int(first_frames[-1]), *size), dtype=torch.uint8)
+    for entry, first in zip(recordings, first_frames, strict=False):
+        _check_recording(entry, kept, size)
+        for row, name in enumerate(kept):
+            source = np.ascontiguousarray(entry.grids[entry.sensors.index(name)])
+            grids[row, first : first + len(source)] = torch.from_numpy(source)
+    return GridData(
+        grids=grids,
+        sensors=kept,
+        target=target,
+        recordings=tuple(entry.name for entry in recordings),
+        logs=tuple(entry.log for entry in recordings),
+        digests=tuple(entry.digest for entry in recordings),
+        first_frames=first_frames,
+        stamps_ns=np.concatenate([entry.stamps_ns for entry in recordings]),
+        position_m=np.concatenate([entry.position_m for entry in recordings]),
+        cell_m=cell_m,
+        actors=tuple(entry.actors for entry in recordings),
+    )
+
+
+def _check_recording(entry: "GridRecording", sensors: tuple[str, ...], size: tuple[int, ...]) -> None:
+    for name in sensors:
+        if name not in entry.sensors:
+            raise InputError(f"the grids of {entry.name} have no sensor {name!r}, only {', '.join(entry.sensors)}")
+    if entry.grids.shape[-2:] != size:
+        raise InputError(f"the grids of {entry.name} are {entry.grids.shape[-2:]}, and the first ones are {size}")
