@@ -12,6 +12,7 @@ from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.grids.build import GridRecording
 from semgrid_eval.log.benchmarks import Stereo
 from semgrid_eval.log.store import write_log
+from semgrid_eval.models.model import Given
 from semgrid_eval.progress import silent
 from semgrid_eval.recording.types import Recording
 from semgrid_eval.sources.town.recordings import (
@@ -25,6 +26,8 @@ from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 _CELLS, _CELL_M, _FRAMES, _FRAME_NS = 128, 100 / 128, 30, 58_823_529
 _COARSE = 8  # cells of a random patch
+GIVEN = Given(("full",), WindowConfig().inputs, _CELLS, _CELLS, _CELL_M, translate=True)
+"""What a row of random windows gives its model."""
 
 
 class Material:
