@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.bench.material import GIVEN
+from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.models.device import seeded
 from semgrid_eval.models.encoder_decoder import EncoderDecoder, EncoderDecoderSettings
 from semgrid_eval.models.network import masked_loss

@@ -1,6 +1,5 @@
 """A model's file and what it imports from beside it, found while its code runs and at no other time."""
 
-import hashlib
 import importlib
 import importlib.util
 import sys
@@ -10,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.files import digest_files
+from semgrid_eval.files import digest_files, digest_value
 
 
 class ModelFile:
@@ -38,23 +37,24 @@ class ModelFile:
             InputError: it is not a Python file.
         """
         # The name stays known, since dataclasses and pickle look a class's module up by it.
-        name = (
-            f"semgrid_eval_own_{hashlib.sha256(str(self._path.resolve()).encode()).hexdigest()[:8]}_{self._path.stem}"
-        )
+        name = f"semgrid_eval_own_{digest_value(str(self._path.resolve()))}_{self._path.stem}"
         spec = importlib.util.spec_from_file_location(name, self._path)
         if not self._path.is_file() or spec is None or spec.loader is None:
             raise InputError("is not a Python file; a model is given as path.py:Class", path=self._path)
         module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
         before = set(sys.modules)
         importlib.invalidate_caches()
-        sys.modules[name] = module
         sys.path.insert(0, str(self.folder))
+        # Bytecode is told from its source by seconds and size, which two versions of a file may share.
+        writes_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
         try:
             spec.loader.exec_module(module)
         except BaseException:
             del sys.modules[name]
             raise
         finally:
+            sys.dont_write_bytecode = writes_bytecode
             sys.path.remove(str(self.folder))
             self._take_neighbours(before)
         self._digest = digest_files(self.sources())

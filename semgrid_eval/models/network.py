@@ -136,9 +136,9 @@ class Network(Model, torch.nn.Module):
 
 def seeded_network(
     network: type[Network],
-    settings: Any,
+    settings: Any,  # noqa: ANN401 - of the network's class `Settings`
     given: Given,
-    seed: int,  # noqa: ANN401 - of the network's class `Settings`
+    seed: int,
 ) -> Network:
     """Make an untrained network on the CPU; the same seed gives the same weights."""
     with seeded(seed, torch.device("cpu")):

@@ -51,10 +51,8 @@ def train(
     """Train a network, or finish a training that was stopped: on one machine's CPU the weights are the same bytes.
 
     `folder` gets `weights.safetensors`, `history.csv` and, while it lasts, `checkpoint.pt`. A training that is
-    complete there is read, not repeated. The loss over the `validation` windows is noted after each epoch.
-
-    Args:
-        network: untrained, as `seeded_network` makes it with this seed; it is moved to the device and trained itself.
+    complete there is read, not repeated. The loss over the `validation` windows is noted after each epoch. The network
+    is untrained, as `seeded_network` makes it with this seed; it is moved to the device and trained itself.
 
     Raises:
         InputError: `folder` belongs to another training, is damaged or cannot be written to.
