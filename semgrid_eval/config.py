@@ -121,7 +121,7 @@ def _first_fault(model: type[BaseModel], error: ValidationError, path: Path | st
     place = ".".join(str(part) for part in fault["loc"]) or "(top level)"
     message = fault["msg"].removeprefix("Value error, ")
     if fault["type"] == "extra_forbidden":
-        allowed = ", ".join(_allowed_keys(model, fault["loc"][:-1]))
+        allowed = ", ".join(_allowed_keys(model, fault["loc"][:-1])) or "none"
         return ConfigError(f"unknown key; allowed here: {allowed}", path=path, field=place)
     shown = repr(fault.get("input"))
     shown = shown if len(shown) <= 80 else shown[:77] + "..."

@@ -8,10 +8,10 @@ import click
 import pytest
 import torch
 import yaml
+from semgrid_eval.models.predictor import load_predictor
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.cli.main import cli
-from semgrid_eval.models.predictor import load_predictor
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.windows.data import WindowBatch
 

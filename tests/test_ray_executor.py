@@ -87,14 +87,16 @@ def test_ray_gives_the_same_bytes_as_this_process(tmp_path):
     from semgrid_eval.log.store import write_log
     from semgrid_eval.ray_executor import RayExecutor
     from semgrid_eval.runs.matrix import load_matrix
-    from semgrid_eval.runs.runner import RunOptions, run_matrix
+    from semgrid_eval.runs.options import RunOptions
+    from semgrid_eval.runs.runner import run_matrix
     from semgrid_eval.scores import results
 
     for i, split in enumerate(("train", "val")):
         write_log(street(i, frames=9).recording(f"toy{i}", split), tmp_path / "logs" / f"toy{i}.mcap")
     (tmp_path / "m.yaml").write_text(
-        "defaults: {window: {step_frames: 3, target_frame: 8}, network: {features: 4, depth: 2},\n"
-        "  training: {epochs: 1, updates_per_epoch: 2, batch: 2, precision: float32}}\n"
+        "defaults: {window: {step_frames: 3, target_frame: 8}}\n"
+        "models: {ed: {features: 4, depth: 2,\n"
+        "  training: {epochs: 1, updates_per_epoch: 2, batch: 2, precision: float32}}}\n"
         "rows:\n- {name: BL-DC, model: newest}\n- {name: ED-DC, model: ed}\n"
     )
     matrix = load_matrix(str(tmp_path / "m.yaml"))

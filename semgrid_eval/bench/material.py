@@ -11,6 +11,7 @@ from semgrid_eval.bench.measurement import Settings
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.grids.recording import GridRecording
 from semgrid_eval.log.store import write_log
+from semgrid_eval.models.model import Given
 from semgrid_eval.progress import silent
 from semgrid_eval.recording.types import Recording
 from semgrid_eval.sources.benchmarks import Stereo
@@ -26,6 +27,8 @@ from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 _CELLS, _CELL_M, _FRAMES, _FRAME_NS = 128, 100 / 128, 30, 58_823_529
 _COARSE = 8  # cells of a random patch
+GIVEN = Given(("full",), WindowConfig().inputs, _CELLS, _CELLS, _CELL_M, translate=True)
+"""What a row of random windows gives its model."""
 
 
 class Material:

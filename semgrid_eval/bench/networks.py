@@ -9,28 +9,31 @@ from statistics import median
 import torch
 from torch.utils.flop_counter import FlopCounterMode
 
-from semgrid_eval.bench.material import random_windows
+from semgrid_eval.bench.material import GIVEN, random_windows
 from semgrid_eval.bench.measurement import Measurement, Settings, wall_s
 from semgrid_eval.bench.textbook import train_by_the_book
-from semgrid_eval.models.baselines import RepeatNewest
-from semgrid_eval.models.device import Precision, choose_precision
-from semgrid_eval.models.network import NetworkConfig, NetworkPredictor, seeded_network
-from semgrid_eval.models.training import TrainingConfig, masked_loss, train
+from semgrid_eval.models.device import Precision, choose_precision, settle_process
+from semgrid_eval.models.encoder_decoder import EncoderDecoder, EncoderDecoderSettings
+from semgrid_eval.models.model import NoSettings
+from semgrid_eval.models.network import TrainingConfig, seeded_network
+from semgrid_eval.models.newest import RepeatNewest
+from semgrid_eval.models.training import train
 from semgrid_eval.scores.evaluate import evaluate
 
 
 def measure_training(settings: Settings, device: torch.device) -> Iterator[Measurement]:
     """Train networks of different width: windows a second, ours and a textbook's.
 
-    All of the textbook's come first, because `train` changes how the whole process keeps memory.
+    All of the textbook's come first, because ours are measured in a process that keeps its memory.
     """
-    textbook = {f: _textbook_rate(NetworkConfig(features=f), settings, device) for f in settings.features}
+    textbook = {f: _textbook_rate(EncoderDecoderSettings(features=f), settings, device) for f in settings.features}
+    settle_process()
     dtype = choose_precision("auto", device)
     name = str(dtype).removeprefix("torch.")
     matrix_rate = _matrix_rate(settings, device, dtype)
     yield Measurement(f"product of {name} matrices", matrix_rate / 1e9, "Gflop/s")
     for features, slow in textbook.items():
-        config = NetworkConfig(features=features)
+        config = EncoderDecoderSettings(features=features)
         rate = _training_rate(config, settings, device)
         share = rate * _flops_of_an_update(config, settings.batch) / settings.batch / matrix_rate
         yield Measurement(f"f {features}, batch {settings.batch}, {name}", rate, "windows/s")
@@ -45,19 +48,18 @@ def measure_training(settings: Settings, device: torch.device) -> Iterator[Measu
 def measure_prediction(settings: Settings, device: torch.device) -> Iterator[Measurement]:
     """Predict windows with networks, and score them."""
     windows = random_windows(settings.windows).to(device)
-    dtype = choose_precision("auto", device)
     for features in settings.features:
-        config = NetworkConfig(features=features)
-        network = seeded_network(config, grids=windows.grids_per_window, preset="keras", seed=0).to(device).eval()
-        predictor = NetworkPredictor(network, dtype)
-        evaluate(predictor, windows)
-        took_s = median(evaluate(predictor, windows).seconds for _ in range(settings.repeats))
+        config = EncoderDecoderSettings(features=features)
+        network = seeded_network(EncoderDecoder, config, GIVEN, seed=0).to(device).eval()
+        evaluate(network, windows)
+        took_s = median(evaluate(network, windows).seconds for _ in range(settings.repeats))
         yield Measurement(f"predicted, f {features}", len(windows) / took_s, "windows/s")
-    took_s = wall_s(lambda: evaluate(RepeatNewest(), windows), settings.repeats)
+    newest = RepeatNewest(NoSettings(), GIVEN)
+    took_s = wall_s(lambda: evaluate(newest, windows), settings.repeats)
     yield Measurement("predicted by BL-DC and scored", len(windows) / took_s, "windows/s")
 
 
-def _textbook_rate(config: NetworkConfig, settings: Settings, device: torch.device) -> float:
+def _textbook_rate(config: EncoderDecoderSettings, settings: Settings, device: torch.device) -> float:
     # The first epoch warms up.
     seconds = train_by_the_book(
         config,
@@ -71,13 +73,14 @@ def _textbook_rate(config: NetworkConfig, settings: Settings, device: torch.devi
 
 
 def _training_rate(
-    config: NetworkConfig, settings: Settings, device: torch.device, *, precision: Precision = "auto"
+    config: EncoderDecoderSettings, settings: Settings, device: torch.device, *, precision: Precision = "auto"
 ) -> float:
     training = TrainingConfig(
         epochs=settings.repeats + 1, updates_per_epoch=settings.updates, batch=settings.batch, precision=precision
     )
+    network = seeded_network(EncoderDecoder, config.model_copy(update={"training": training}), GIVEN, seed=0)
     with tempfile.TemporaryDirectory() as folder:
-        trained = train(random_windows(), config, training, seed=0, device=device, folder=Path(folder))
+        trained = train(network, random_windows(), seed=0, device=device, folder=Path(folder))
     return settings.updates * settings.batch / median(row.seconds for row in trained.history[1:])
 
 
@@ -93,11 +96,11 @@ def _matrix_rate(settings: Settings, device: torch.device, dtype: torch.dtype) -
     return 2.0 * settings.matrix_rows**3 / median(seconds[1:])
 
 
-def _flops_of_an_update(config: NetworkConfig, batch: int) -> float:
+def _flops_of_an_update(config: EncoderDecoderSettings, batch: int) -> float:
     """Count the floating-point operations of the network, forward and backward, over one batch."""
     windows = random_windows()
-    network = seeded_network(config, grids=windows.grids_per_window, preset="keras", seed=0)
+    network = seeded_network(EncoderDecoder, config, GIVEN, seed=0)
     part = windows.batch(slice(0, 1))
     with FlopCounterMode(display=False) as counter:
-        masked_loss(network(part.past), part.target, part.mask).backward()  # type: ignore[no-untyped-call]
+        network.loss(network(part), part).backward()  # type: ignore[no-untyped-call]
     return float(counter.get_total_flops()) * batch

@@ -9,17 +9,20 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from semgrid_eval.bench.material import GIVEN
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.models.network import NetworkConfig, seeded_network
-from semgrid_eval.models.training import masked_loss
+from semgrid_eval.models.device import seeded
+from semgrid_eval.models.encoder_decoder import EncoderDecoder, EncoderDecoderSettings
+from semgrid_eval.models.network import masked_loss
 from semgrid_eval.windows.data import WindowSet
 
 
 def train_by_the_book(
-    config: NetworkConfig, windows: WindowSet, *, batch: int, updates: int, epochs: int, device: torch.device
+    config: EncoderDecoderSettings, windows: WindowSet, *, batch: int, updates: int, epochs: int, device: torch.device
 ) -> list[float]:
     """Train and return the seconds of each epoch of `updates` batches; the network is thrown away."""
-    network = seeded_network(config, grids=windows.grids_per_window, preset="keras", seed=0)
+    with seeded(0, torch.device("cpu")):
+        network = EncoderDecoder(config, GIVEN)
     network.to(device=device, memory_format=torch.contiguous_format)  # type: ignore[call-overload]
     optimizer = torch.optim.RMSprop(network.parameters(), lr=1e-3, alpha=0.9, eps=1e-7)
     generator = torch.Generator().manual_seed(0)

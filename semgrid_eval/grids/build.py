@@ -139,7 +139,7 @@ class _Stretch:
             digest=reader.digest,
             split=reader.scene.split,
             dataset=reader.scene.dataset,
-            group=getattr(reader.scene, "group", ""),
+            group=reader.scene.group,
             sensors=tuple(self._config.rows),
             target=self._config.target_row,
             stamps_ns=stamps_ns,

@@ -1,1 +1,1 @@
-"""Predictors: baselines and the encoder-decoder, with its training."""
+"""Models: the protocol, the table of names, the one loop that trains, and one module for each model."""

@@ -2,20 +2,25 @@
 
 import csv
 import io
+import json
 import pickle
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file, write_text
-from semgrid_eval.models.network import EncoderDecoder, load_network, read_header, save_network
+from semgrid_eval.models.network import Network
 
 WEIGHTS_FILE = "weights.safetensors"
 HISTORY_FILE = "history.csv"
 CHECKPOINT_FILE = "checkpoint.pt"
+_HEADER = "semgrid_eval"
 
 
 class EpochRecord(NamedTuple):
@@ -48,17 +53,18 @@ class TrainingFolder:
         self._check_key(read_header(weights).get("training"), weights)
         return True
 
-    def read(self, device: torch.device) -> tuple[EncoderDecoder, list[EpochRecord]]:
-        """Read a finished training.
+    def read(self, network: Network) -> list[EpochRecord]:
+        """Load the weights of a finished training into the network and return its history.
 
         Raises:
             InputError: a file is missing or damaged.
         """
         self._checkpoint.unlink(missing_ok=True)  # a stop between the weights and this leaves it
-        return load_network(self._path / WEIGHTS_FILE, device), read_history(self._path / HISTORY_FILE)
+        load_weights(network, self._path / WEIGHTS_FILE)
+        return read_history(self._path / HISTORY_FILE)
 
-    def restore(self, network: EncoderDecoder, optimizer: torch.optim.Optimizer) -> list[EpochRecord]:
-        """Load the checkpoint into network and optimizer and give the history so far; nothing where there is none.
+    def restore(self, network: Network, optimizer: torch.optim.Optimizer) -> list[EpochRecord]:
+        """Load the checkpoint into network and optimizer and return the history so far, empty where there is none.
 
         Raises:
             InputError: the checkpoint is damaged or another training's.
@@ -73,9 +79,11 @@ class TrainingFolder:
             optimizer.load_state_dict(state["optimizer"])
             return [EpochRecord(*row) for row in state["history"]]
         except (OSError, RuntimeError, ValueError, KeyError, TypeError, EOFError, pickle.UnpicklingError) as error:
-            raise InputError(f"is damaged; delete it to train afresh ({error})", path=self._checkpoint) from error
+            raise InputError(
+                f"is damaged; delete it to train again from the start ({error})", path=self._checkpoint
+            ) from error
 
-    def keep(self, network: EncoderDecoder, optimizer: torch.optim.Optimizer, history: Sequence[EpochRecord]) -> None:
+    def keep(self, network: Network, optimizer: torch.optim.Optimizer, history: Sequence[EpochRecord]) -> None:
         """Write the checkpoint, then the history: a stop loses nothing that was kept before.
 
         Raises:
@@ -91,14 +99,14 @@ class TrainingFolder:
             torch.save(state, stream)
         write_history(self._path / HISTORY_FILE, history)
 
-    def finish(self, network: EncoderDecoder, history: Sequence[EpochRecord]) -> None:
+    def finish(self, network: Network, history: Sequence[EpochRecord]) -> None:
         """Write history and weights and remove the checkpoint.
 
         Raises:
             InputError: the folder cannot be written to.
         """
         write_history(self._path / HISTORY_FILE, history)
-        save_network(network, self._path / WEIGHTS_FILE, training=self._key)
+        save_weights(network, self._path / WEIGHTS_FILE, training=self._key)
         self._checkpoint.unlink(missing_ok=True)
 
     @property
@@ -108,6 +116,50 @@ class TrainingFolder:
     def _check_key(self, found: object, path: Path) -> None:
         if found != self._key:
             raise InputError(f"belongs to another training ({found}, not {self._key})", path=path)
+
+
+def save_weights(network: Network, path: Path, **notes: str) -> None:
+    """Write weights as safetensors; the header says of what model they are, with which settings, and `notes`."""
+    header = {
+        "model": type(network).__name__,
+        "settings": network.settings.model_dump(mode="json"),
+        "given": asdict(network.given),
+        **notes,
+    }
+    tensors = {name: value.detach().cpu().contiguous() for name, value in network.state_dict().items()}
+    # One entry, because safetensors writes several in an order that changes from time to time.
+    content = save(tensors, metadata={_HEADER: json.dumps(header, sort_keys=True)})
+    with atomic_file(path) as stream:
+        stream.write(content)
+
+
+def load_weights(network: Network, path: Path) -> None:
+    """Load weights that `save_weights` wrote into a network of the same build.
+
+    Raises:
+        InputError: the file is missing, damaged or of another network.
+    """
+    read_header(path)
+    try:
+        with safe_open(path, framework="pt") as archive:
+            network.load_state_dict({name: archive.get_tensor(name) for name in archive.keys()})  # noqa: SIM118
+    except (KeyError, TypeError, RuntimeError) as error:
+        raise InputError(f"has no weights of this network: {error}", path=path) from error
+
+
+def read_header(path: Path) -> dict[str, Any]:
+    """Read what `save_weights` wrote beside the weights.
+
+    Raises:
+        InputError: the file is missing, damaged or not of this kind.
+    """
+    try:
+        with safe_open(path, framework="pt") as archive:
+            return dict(json.loads((archive.metadata() or {})[_HEADER]))
+    except (OSError, SafetensorError) as error:
+        raise InputError(f"cannot be read: {error}", path=path) from error
+    except (KeyError, TypeError, ValueError):
+        raise InputError("holds no network of this version", path=path) from None
 
 
 def write_history(path: Path, history: Sequence[EpochRecord]) -> None:

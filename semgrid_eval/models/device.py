@@ -25,12 +25,9 @@ _MALLOPT = {-4: 0, -1: 2**31 - 1, -2: 256 << 20}  # M_MMAP_MAX, M_TRIM_THRESHOLD
 def choose_device(name: str = "auto") -> torch.device:
     """Turn `auto` (CUDA where there is one, else CPU), `cpu`, `cuda`, `cuda:1` ... into a device.
 
-    CUDA's convolutions are set to repeat their sums in the same order, and float32 to be no less.
-
     Raises:
         ConfigError: there is no such device here.
     """
-    torch.backends.cudnn.deterministic, torch.backends.cudnn.allow_tf32 = True, False
     if name == "auto":
         return torch.device("cuda" if torch.cuda.is_available() else "cpu")
     try:
@@ -74,17 +71,27 @@ def cpu_has_bf16() -> bool:
     return not _BF16_FLAGS.isdisjoint(flags.split())
 
 
-def keep_freed_memory() -> None:
-    """Make glibc keep freed memory for the whole process instead of giving each large tensor back to the system.
+def settle_process() -> None:
+    """Set what holds for this whole process; whoever begins to train or score in one calls this first.
 
-    Page faults of fresh memory otherwise take up to half of the time of a training on a CPU. Elsewhere: no effect.
+    CUDA's convolutions repeat their sums in the same order, and their float32 is no less. glibc keeps freed memory
+    instead of giving each large tensor back to the system: page faults of fresh memory otherwise take up to half of
+    the time of a training on a CPU.
     """
+    torch.backends.cudnn.deterministic, torch.backends.cudnn.allow_tf32 = True, False
     try:
         mallopt = ctypes.CDLL(None).mallopt
     except (OSError, TypeError, AttributeError):  # not glibc
         return
     for parameter, value in _MALLOPT.items():
         mallopt(parameter, value)
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Tell whether an error says that something does not fit into memory; on a CPU, torch has no type for it."""
+    if isinstance(error, (torch.OutOfMemoryError, MemoryError)):
+        return True
+    return isinstance(error, RuntimeError) and "allocate memory" in str(error)
 
 
 @contextmanager

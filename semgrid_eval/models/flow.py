@@ -16,8 +16,8 @@ from torch import Tensor
 
 from semgrid_eval.classes import CLASSES, UNKNOWN, Category
 from semgrid_eval.config import Config
-from semgrid_eval.models.baselines import overlay
-from semgrid_eval.models.predictor import one_hot
+from semgrid_eval.models.model import Baseline, one_hot
+from semgrid_eval.models.overlay import overlay
 from semgrid_eval.windows.data import WindowBatch
 
 Grid = NDArray[np.uint8]
@@ -30,7 +30,7 @@ MOVABLE = tuple(
 _IS_STATIC = np.array([entry.category is Category.STATIC for entry in CLASSES]) & (np.arange(len(CLASSES)) != UNKNOWN)
 
 
-class FlowConfig(Config):
+class FlowSettings(Config):
     """What counts as evidence of motion; a component of cells that lacks any of it stays where BL-Fuse has it.
 
     Args:
@@ -67,19 +67,13 @@ class Move(NamedTuple):
     overlap: float
 
 
-class MoveOn:
-    """BL-Flow (not in the paper).
+class MoveOn(Baseline):
+    """BL-Flow (not in the paper)."""
 
-    Args:
-        config: what counts as evidence of motion.
-        cell_m: edge of a cell.
-    """
+    Settings = FlowSettings
+    words = "all inputs overlaid, what is seen moving between the newest two moved on"
 
-    def __init__(self, config: FlowConfig, cell_m: float) -> None:
-        self._config = config
-        self._cell_m = cell_m
-
-    def __call__(self, batch: WindowBatch, /) -> Tensor:
+    def predict(self, batch: WindowBatch) -> Tensor:
         """Return BL-Fuse's overlay with what moves moved on, as certain scores: (B, C, H, W)."""
         layers = torch.stack([overlay(grids) for grids in batch.past.flip(2).unbind(dim=2)], dim=1)  # newest first
         if layers.shape[1] < 2:
@@ -91,7 +85,7 @@ class MoveOn:
     def _moved_on(self, layers: Grid, lead_s: NDArray[np.float32]) -> Grid:
         """Predict one window: layers (T, H, W) and their (T,) times to the target, newest first -> (H, W)."""
         gap_s = float(lead_s[1] - lead_s[0])
-        moves = find_moves(layers[1], layers[0], gap_s / self._cell_m, self._config)
+        moves = find_moves(layers[1], layers[0], gap_s / self.given.cell_m, self.settings)
         bare = layers.copy()
         for move in moves:
             bare[0][tuple(move.newer.T)] = UNKNOWN
@@ -106,7 +100,7 @@ class MoveOn:
         return result
 
 
-def find_moves(older: Grid, newer: Grid, cells_per_mps: float, config: FlowConfig) -> list[Move]:
+def find_moves(older: Grid, newer: Grid, cells_per_mps: float, config: FlowSettings) -> list[Move]:
     """Match components of two aligned grids (H, W) that show motion, each of them once.
 
     Args:
@@ -132,7 +126,7 @@ def _components(layer: NDArray[np.bool_], least_cells: int) -> list[Cells]:
     return [np.argwhere(labels == label) for label in large]
 
 
-def _match(class_id: int, older: Cells, newer: Cells, reach_cells: float, config: FlowConfig) -> Move | None:
+def _match(class_id: int, older: Cells, newer: Cells, reach_cells: float, config: FlowSettings) -> Move | None:
     """Find the motion between two components, None where it is too short or too long or they are too different."""
     if min(len(older), len(newer)) < config.size_ratio * max(len(older), len(newer)):
         return None
@@ -153,7 +147,7 @@ def _overlap(first: Cells, second: Cells) -> float:
     return common / (len(first) + len(second) - common)
 
 
-def _is_motion(move: Move, older: Grid, newer: Grid, config: FlowConfig) -> bool:
+def _is_motion(move: Move, older: Grid, newer: Grid, config: FlowSettings) -> bool:
     """Tell whether the place that was left has become free and the one that was taken had been free."""
     was, now = np.zeros(older.shape, np.bool_), np.zeros(older.shape, np.bool_)
     was[tuple(move.older.T)] = True

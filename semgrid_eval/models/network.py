@@ -1,106 +1,158 @@
-"""The encoder-decoder (ED) of the paper: grids in, class scores of the target out (readings 4 to 7)."""
+"""What gradients train: a torch module with its loss, optimiser and schedule, and grids as planes for its layers."""
 
-import json
-from pathlib import Path
-from typing import Any, Literal
+from collections.abc import Iterator
+from typing import Any, Literal, Self
 
 import torch
-from pydantic import Field, field_validator
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
-from torch import Tensor, nn
+from pydantic import Field, model_validator
+from torch import Tensor
 from torch.nn import functional as F
 
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.config import Config, parse_config
-from semgrid_eval.errors import ConfigError, InputError
-from semgrid_eval.files import atomic_file
-from semgrid_eval.models.device import seeded
+from semgrid_eval.config import Config
+from semgrid_eval.models.device import Precision, choose_precision, seeded
+from semgrid_eval.models.model import Given, Model
 from semgrid_eval.windows.data import WindowBatch
 
-Preset = Literal["keras", "torch"]
-Activation = Literal["linear", "relu"]
-DROPOUT_RATE = 0.5
-_HEADER = "semgrid_eval"
+Constants = Literal["keras", "torch"]
+_IGNORED = -100
+_OPTIMIZERS: dict[tuple[str, str], tuple[type[torch.optim.Optimizer], dict[str, Any]]] = {
+    ("rmsprop", "keras"): (torch.optim.RMSprop, {"alpha": 0.9, "eps": 1e-7}),
+    ("rmsprop", "torch"): (torch.optim.RMSprop, {"alpha": 0.99, "eps": 1e-8}),
+    ("adam", "keras"): (torch.optim.Adam, {"eps": 1e-7}),
+    ("adam", "torch"): (torch.optim.Adam, {"eps": 1e-8}),
+}
 
 
-class NetworkConfig(Config):
-    """Depth d (encoder blocks) and features f (channels of the first block) of an ED."""
+class OptimizerConfig(Config):
+    """What makes the updates; `constants` says whose defaults it has (reading 7)."""
 
-    depth: int = Field(default=3, ge=2, le=6)
-    features: int = Field(default=64, ge=2, le=512)
-    decoder_activation: Activation = "linear"
+    kind: Literal["rmsprop", "adam"] = "rmsprop"
+    constants: Constants = "keras"
 
-    @field_validator("features")
-    @classmethod
-    def _can_be_halved(cls, features: int) -> int:
-        if features % 2:
-            raise ValueError("features must be even, because the last block halves them")
-        return features
+    def make(self, parameters: Iterator[torch.nn.Parameter], learning_rate: float) -> torch.optim.Optimizer:
+        """Make the optimiser of these parameters."""
+        kind, constants = _OPTIMIZERS[self.kind, self.constants]
+        return kind(parameters, lr=learning_rate, **constants)  # type: ignore[call-arg]
 
 
-class EncoderDecoder(nn.Module):
-    """The ED: d encoder blocks with pooling between them, d - 1 decoder blocks with skip connections.
+class ScheduleConfig(Config):
+    """The learning rate, epoch by epoch; the defaults are the paper's.
 
     Args:
-        grids: how many grids a sample has, sensors times inputs.
-        preset: whose constants batch normalisation and initial weights follow.
+        drop_epoch: epochs after this many use `rate_after_drop`; None keeps `learning_rate`.
     """
 
-    def __init__(self, config: NetworkConfig, *, grids: int, preset: Preset = "keras") -> None:
-        super().__init__()
-        widths = [config.features * 2**i for i in range(config.depth)]
-        self.config = config
-        self.grids = grids
-        self.preset: Preset = preset
-        self.encoder = nn.ModuleList(
-            _Block(inputs, outputs, activation="relu", preset=preset)
-            for inputs, outputs in zip([grids * CLASS_COUNT, *widths], widths, strict=False)
-        )
-        self.dropout = nn.Dropout(DROPOUT_RATE)
-        pairs = list(zip(widths[1:], widths[:-1], strict=True))[::-1]
-        self.up = nn.ModuleList(_Upsample(inputs, outputs) for inputs, outputs in pairs)
-        self.decoder = nn.ModuleList(
-            _Block(inputs, outputs, activation=config.decoder_activation, preset=preset) for inputs, outputs in pairs
-        )
-        self.narrow = nn.Conv2d(config.features, config.features // 2, 3, padding=1)
-        self.classify = nn.Conv2d(config.features // 2, CLASS_COUNT, 1)
-        if preset == "keras":
-            self.apply(_initialise_as_keras)
-        self.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack this form
+    learning_rate: float = Field(default=1e-3, gt=0)
+    drop_epoch: int | None = Field(default=35, ge=0)
+    rate_after_drop: float = Field(default=1e-4, gt=0)
 
-    def forward(self, past: Tensor) -> Tensor:
-        """Score the target: (B, S, T, H, W) uint8 class ids -> (B, C, H, W) logits."""
-        return self.from_planes(one_hot_planes(past.flatten(1, 2), _working_dtype(self.narrow.weight)))
+    def rate_in(self, epoch: int) -> float:
+        """Learning rate of an epoch, counted from 0."""
+        late = self.drop_epoch is not None and epoch >= self.drop_epoch
+        return self.rate_after_drop if late else self.learning_rate
 
-    def from_planes(self, planes: Tensor) -> Tensor:
-        """Score the target from class probabilities: (B, S * T * C, H, W) -> (B, C, H, W) logits."""
-        features, skips = planes, list[Tensor]()
-        for block in self.encoder:
-            features = block(F.max_pool2d(features, 2) if skips else features)
-            skips.append(features)
-        features = self.dropout(skips.pop())
-        for up, block in zip(self.up, self.decoder, strict=True):
-            features = block(torch.cat([skips.pop(), up(features)], dim=1))
-        return torch.as_tensor(self.classify(self.narrow(features)))
+
+class TrainingConfig(Config):
+    """How a network is trained; the defaults are the paper's (readings 1 and 7).
+
+    Args:
+        updates_per_epoch: batches an epoch; with `epoch_unit: windows` it counts windows instead.
+        clip_norm: limit of the gradient's norm; the paper has none.
+        precision: `auto` takes bfloat16 where the device multiplies in it natively.
+    """
+
+    epochs: int = Field(default=40, ge=1)
+    updates_per_epoch: int = Field(default=185, ge=1)
+    epoch_unit: Literal["batches", "windows"] = "batches"
+    batch: int = Field(default=32, ge=1)
+    precision: Precision = "auto"
+    clip_norm: float | None = Field(default=None, gt=0)
+    optimizer: OptimizerConfig = OptimizerConfig()
+    schedule: ScheduleConfig = ScheduleConfig()
+
+    @model_validator(mode="after")
+    def _epoch_holds_a_batch(self) -> Self:
+        if self.updates_until(1) < 1:
+            raise ValueError(f"an epoch of {self.updates_per_epoch} windows does not fill a batch of {self.batch}")
+        return self
+
+    def updates_until(self, epoch: int) -> int:
+        """Updates made when `epoch` epochs are over; a batch that two epochs share counts for the second."""
+        per_update = self.batch if self.epoch_unit == "windows" else 1
+        return epoch * self.updates_per_epoch // per_update
+
+
+class NetworkSettings(Config):
+    """Settings of any network; its own class adds what its layers need."""
+
+    training: TrainingConfig = TrainingConfig()
+
+
+class Network(Model, torch.nn.Module):
+    """Base of all that gradients train: subclass it, make layers in `__init__` and logits in `forward`.
+
+    `semgrid_eval.models.training` does the rest. Weights come from the training, so that no file is read unless
+    `files` says so.
+    """
+
+    Settings = NetworkSettings
+    random = True
+    files = ()
+
+    def forward(self, batch: WindowBatch) -> Tensor:
+        """Score the target from a batch's past and motion: (B, C, H, W) logits."""
+        raise NotImplementedError(f"{type(self).__name__} has no `forward`")
+
+    def loss(self, logits: Tensor, batch: WindowBatch) -> Tensor:
+        """Return what the training makes small: float32 logits (B, C, H, W) -> scalar, a mean over the windows."""
+        return masked_loss(logits, batch.target, batch.mask)
+
+    def optimizer(self) -> torch.optim.Optimizer:
+        """Make the optimiser that the settings ask for."""
+        training = self.training_config
+        return training.optimizer.make(self.parameters(), training.schedule.learning_rate)
+
+    def predict(self, batch: WindowBatch) -> Tensor:
+        """Return class probabilities: (B, C, H, W) float32, computed in the precision of the training."""
+        dtype = self.dtype_on(batch.past.device)
+        with torch.inference_mode(), autocast(batch.past.device, dtype):
+            return torch.as_tensor(self(batch)).float().softmax(dim=1)
 
     @property
-    def parameter_count(self) -> int:
-        """Number of trained values."""
-        return sum(parameter.numel() for parameter in self.parameters())
+    def training_config(self) -> TrainingConfig:
+        """How it is trained."""
+        return self.settings.training  # type: ignore[no-any-return]
+
+    def dtype_on(self, device: torch.device) -> torch.dtype:
+        """Return what it computes in on a device."""
+        return choose_precision(self.training_config.precision, device)
+
+    @classmethod
+    def learns(cls) -> bool:
+        """Whether it is fitted to training windows: always."""
+        return True
 
 
-class NetworkPredictor:
-    """A trained ED as a predictor: softmax probabilities, computed in the given precision."""
+def seeded_network(
+    network: type[Network],
+    settings: Any,  # noqa: ANN401 - of the network's class `Settings`
+    given: Given,
+    seed: int,
+) -> Network:
+    """Make an untrained network on the CPU; the same seed gives the same weights."""
+    with seeded(seed, torch.device("cpu")):
+        return network(settings, given)
 
-    def __init__(self, network: EncoderDecoder, dtype: torch.dtype = torch.float32) -> None:
-        self._network = network.eval()
-        self._dtype = dtype
 
-    def __call__(self, batch: WindowBatch, /) -> Tensor:
-        """Return class probabilities: (B, C, H, W) float32."""
-        with torch.inference_mode(), autocast(batch.past.device, self._dtype):
-            return self._network(batch.past).float().softmax(dim=1)  # type: ignore[no-any-return]
+def masked_loss(logits: Tensor, target: Tensor, mask: Tensor) -> Tensor:
+    """Cross entropy without loss inside M, the mean over all cells (reading 10).
+
+    Logits (B, C, H, W), target (B, H, W) uint8, mask M (B, H, W) bool -> scalar. Taking the target for the prediction
+    inside M, as the paper's equation does, makes the loss there zero.
+    """
+    counted = target.long().masked_fill(mask, _IGNORED)
+    return F.cross_entropy(logits.float(), counted, ignore_index=_IGNORED, reduction="sum") / target.numel()
 
 
 def one_hot_planes(grids: Tensor, dtype: torch.dtype) -> Tensor:
@@ -110,106 +162,13 @@ def one_hot_planes(grids: Tensor, dtype: torch.dtype) -> Tensor:
     return planes.flatten(3).to(dtype).permute(0, 3, 1, 2)
 
 
+def input_planes(past: Tensor) -> Tensor:
+    """Spread all inputs over channels: (B, S, T, H, W) uint8 -> (B, S * T * C, H, W), in what layers compute in."""
+    device = past.device.type
+    dtype = torch.get_autocast_dtype(device) if torch.is_autocast_enabled(device) else torch.float32
+    return one_hot_planes(past.flatten(1, 2), dtype)
+
+
 def autocast(device: torch.device, dtype: torch.dtype) -> torch.autocast:
     """Compute in `dtype` inside the block; float32 changes nothing."""
     return torch.autocast(device.type, dtype=torch.bfloat16, enabled=dtype == torch.bfloat16)
-
-
-def seeded_network(config: NetworkConfig, *, grids: int, preset: Preset, seed: int) -> EncoderDecoder:
-    """Make an untrained ED on the CPU; the same seed gives the same weights."""
-    with seeded(seed, torch.device("cpu")):
-        return EncoderDecoder(config, grids=grids, preset=preset)
-
-
-def check_grid_size(config: NetworkConfig, rows: int, columns: int) -> None:
-    """Check that the grid can be halved d - 1 times.
-
-    Raises:
-        ConfigError: it cannot.
-    """
-    factor = 2 ** (config.depth - 1)
-    if rows % factor or columns % factor:
-        raise ConfigError(f"depth {config.depth} needs grids of a multiple of {factor} cells, not {rows} x {columns}")
-
-
-def save_network(network: EncoderDecoder, path: Path, **notes: str) -> None:
-    """Write weights as safetensors; the header has all that `load_network` needs, and `notes`."""
-    header = {"config": network.config.model_dump(), "grids": network.grids, "preset": network.preset, **notes}
-    tensors = {name: value.detach().cpu().contiguous() for name, value in network.state_dict().items()}
-    # One entry, because safetensors writes several in an order that changes from time to time.
-    content = save(tensors, metadata={_HEADER: json.dumps(header, sort_keys=True)})
-    with atomic_file(path) as stream:
-        stream.write(content)
-
-
-def load_network(path: Path, device: torch.device | None = None) -> EncoderDecoder:
-    """Read a network that `save_network` wrote.
-
-    Raises:
-        InputError: the file is missing, damaged or not of this kind.
-    """
-    header = read_header(path)
-    try:
-        config = parse_config(NetworkConfig, header["config"], path=path)
-        network = EncoderDecoder(config, grids=header["grids"], preset=header["preset"])
-        with safe_open(path, framework="pt") as archive:
-            network.load_state_dict({name: archive.get_tensor(name) for name in archive.keys()})  # noqa: SIM118
-    except (KeyError, TypeError, RuntimeError) as error:
-        raise InputError(f"holds no network of this version: {error}", path=path) from error
-    return network.to(device or torch.device("cpu")).eval()
-
-
-def read_header(path: Path) -> dict[str, Any]:
-    """Read what `save_network` wrote beside the weights.
-
-    Raises:
-        InputError: the file is missing, damaged or not of this kind.
-    """
-    try:
-        with safe_open(path, framework="pt") as archive:
-            return dict(json.loads((archive.metadata() or {})[_HEADER]))
-    except (OSError, SafetensorError) as error:
-        raise InputError(f"cannot be read: {error}", path=path) from error
-    except (KeyError, TypeError, ValueError):
-        raise InputError("holds no network of this version", path=path) from None
-
-
-class _Block(nn.Sequential):
-    """Twice: 3 x 3 convolution, batch normalisation, activation."""
-
-    def __init__(self, inputs: int, outputs: int, *, activation: Activation, preset: Preset) -> None:
-        layers: list[nn.Module] = []
-        for width in (inputs, outputs):
-            # A bias would be removed by the normalisation that follows.
-            layers += [nn.Conv2d(width, outputs, 3, padding=1, bias=False), _normalisation(outputs, preset)]
-            layers += [nn.ReLU(inplace=True)] if activation == "relu" else []
-        super().__init__(*layers)
-
-
-class _Upsample(nn.Module):
-    """Nearest neighbour times two, then a 2 x 2 convolution padded as Keras does: below and to the right."""
-
-    def __init__(self, inputs: int, outputs: int) -> None:
-        super().__init__()
-        self.convolution = nn.Conv2d(inputs, outputs, 2)
-
-    def forward(self, features: Tensor) -> Tensor:
-        larger = F.interpolate(features, scale_factor=2, mode="nearest")
-        return torch.as_tensor(self.convolution(F.pad(larger, (0, 1, 0, 1))))
-
-
-def _normalisation(channels: int, preset: Preset) -> nn.BatchNorm2d:
-    return nn.BatchNorm2d(channels, eps=1e-3, momentum=0.01) if preset == "keras" else nn.BatchNorm2d(channels)
-
-
-def _initialise_as_keras(module: nn.Module) -> None:
-    if isinstance(module, nn.Conv2d):
-        nn.init.xavier_uniform_(module.weight)
-        if module.bias is not None:
-            nn.init.zeros_(module.bias)
-
-
-def _working_dtype(weight: Tensor) -> torch.dtype:
-    """Type that a convolution with this weight will compute in."""
-    device = weight.device.type
-    return torch.get_autocast_dtype(device) if torch.is_autocast_enabled(device) else weight.dtype

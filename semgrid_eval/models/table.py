@@ -4,41 +4,41 @@ import torch
 from torch import Tensor
 
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.models.baselines import newest_first
+from semgrid_eval.models.model import Baseline
+from semgrid_eval.models.overlay import newest_first
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 GRID_LIMIT = 5
 """Grids that a table looks at, the newest ones: it has 10 to the power of their number rows."""
 SMOOTHING_CELLS = 50.0
 """How many cells of what fewer grids suggest are added to the counts of each row."""
+BATCH = 64
+"""Windows that are counted at once."""
 
 
-class ClassTable:
-    """A table over the newest K grids as a predictor.
+class ClassTable(Baseline):
+    """A table over the newest K grids; a row's index has the newest grid's class as its first digit."""
 
-    Args:
-        probability: (C ** K, C) of each target class; a row's index has the newest grid's class as its first digit.
-    """
+    words = "likeliest class given the inputs' classes in the cell, counted on the training windows"
+    _probability: Tensor  # (C ** K, C) of each target class
 
-    def __init__(self, probability: Tensor, grids: int) -> None:
-        self._probability = probability
-        self._grids = grids
+    @property
+    def _grids(self) -> int:
+        return min(self.given.grids, GRID_LIMIT)
 
-    def __call__(self, batch: WindowBatch, /) -> Tensor:
+    def fit(self, windows: WindowSet) -> None:
+        """Count the target's classes over all cells outside M of training windows."""
+        size = CLASS_COUNT ** (self._grids + 1)
+        counts = torch.zeros(size, dtype=torch.int64)
+        for part in windows.batches(BATCH):
+            index = _rows(part, self._grids) * CLASS_COUNT + part.target
+            counts += torch.bincount(index[~part.mask], minlength=size).cpu()
+        self._probability = _smoothed(counts.view([CLASS_COUNT] * (self._grids + 1)).double()).float()
+
+    def predict(self, batch: WindowBatch) -> Tensor:
         """Look every cell up: (B, C, H, W)."""
         table = self._probability.to(batch.past.device)
         return table[_rows(batch, self._grids)].permute(0, 3, 1, 2)
-
-
-def count_table(windows: WindowSet, *, batch: int = 64) -> ClassTable:
-    """Count the target's classes over all cells outside M of training windows."""
-    grids = min(windows.grids_per_window, GRID_LIMIT)
-    size = CLASS_COUNT ** (grids + 1)
-    counts = torch.zeros(size, dtype=torch.int64)
-    for part in windows.batches(batch):
-        index = _rows(part, grids) * CLASS_COUNT + part.target
-        counts += torch.bincount(index[~part.mask], minlength=size).cpu()
-    return ClassTable(_smoothed(counts.view([CLASS_COUNT] * (grids + 1)).double()).float(), grids)
 
 
 def _rows(batch: WindowBatch, grids: int) -> Tensor:

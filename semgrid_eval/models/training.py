@@ -1,75 +1,24 @@
-"""Training of the encoder-decoder: masked loss, RMSprop, and an exact restart after a stop."""
+"""The one loop that trains: any network with its loss, and an exact restart after a stop."""
 
 import hashlib
 import math
 import time
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal, Self
 
 import torch
-from pydantic import Field, model_validator
 from torch import Tensor
-from torch.nn import functional as F
 
-from semgrid_eval.config import Config
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.files import digest_value, locked
 from semgrid_eval.models.checkpoint import EpochRecord, TrainingFolder
-from semgrid_eval.models.device import Precision, choose_precision, keep_freed_memory, seeded
-from semgrid_eval.models.network import (
-    EncoderDecoder,
-    NetworkConfig,
-    Preset,
-    autocast,
-    check_grid_size,
-    seeded_network,
-)
+from semgrid_eval.models.device import seeded
+from semgrid_eval.models.network import Network, autocast
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
-_IGNORED = -100
 _REPORT_INTERVAL_S = 0.5
-
-
-class TrainingConfig(Config):
-    """How an ED is trained; the defaults are the paper's (readings 1 and 7).
-
-    Args:
-        updates_per_epoch: batches an epoch; with `epoch_unit: windows` it counts windows instead.
-        learning_rate_drop_epoch: epochs after this many use `learning_rate_after_drop`; None keeps `learning_rate`.
-        clip_norm: limit of the gradient's norm; the paper has none.
-        precision: `auto` takes bfloat16 where the device multiplies in it natively.
-        optimizer_preset: whose constants RMSprop, batch normalisation and initial weights follow.
-    """
-
-    epochs: int = Field(default=40, ge=1)
-    updates_per_epoch: int = Field(default=185, ge=1)
-    epoch_unit: Literal["batches", "windows"] = "batches"
-    batch: int = Field(default=32, ge=1)
-    learning_rate: float = Field(default=1e-3, gt=0)
-    learning_rate_drop_epoch: int | None = Field(default=35, ge=0)
-    learning_rate_after_drop: float = Field(default=1e-4, gt=0)
-    optimizer_preset: Preset = "keras"
-    clip_norm: float | None = Field(default=None, gt=0)
-    precision: Precision = "auto"
-
-    @model_validator(mode="after")
-    def _epoch_holds_a_batch(self) -> Self:
-        if self.updates_until(1) < 1:
-            raise ValueError(f"an epoch of {self.updates_per_epoch} windows does not fill a batch of {self.batch}")
-        return self
-
-    def updates_until(self, epoch: int) -> int:
-        """Updates made when `epoch` epochs are over; a batch that two epochs share counts for the second."""
-        per_update = self.batch if self.epoch_unit == "windows" else 1
-        return epoch * self.updates_per_epoch // per_update
-
-    def learning_rate_in(self, epoch: int) -> float:
-        """Learning rate of an epoch, counted from 0."""
-        late = self.learning_rate_drop_epoch is not None and epoch >= self.learning_rate_drop_epoch
-        return self.learning_rate_after_drop if late else self.learning_rate
 
 
 class DivergedError(SemgridError):
@@ -82,19 +31,16 @@ class Trained:
 
     Args:
         seconds: time spent on updates, without validation and without what lay between a stop and a restart.
-        dtype: what it was trained in and is meant to predict in.
     """
 
-    network: EncoderDecoder
+    network: Network
     history: tuple[EpochRecord, ...]
     seconds: float
-    dtype: torch.dtype
 
 
 def train(
+    network: Network,
     windows: WindowSet,
-    network_config: NetworkConfig,
-    training_config: TrainingConfig,
     *,
     seed: int,
     device: torch.device,
@@ -102,47 +48,33 @@ def train(
     progress: Progress = silent,
     validation: WindowSet | None = None,
 ) -> Trained:
-    """Train an ED, or finish a training that was stopped: on one machine's CPU the weights are the same bytes.
+    """Train a network, or finish a training that was stopped: on one machine's CPU the weights are the same bytes.
 
     `folder` gets `weights.safetensors`, `history.csv` and, while it lasts, `checkpoint.pt`. A training that is
-    complete there is read, not repeated. The loss over the `validation` windows is noted after each epoch.
+    complete there is read, not repeated. The loss over the `validation` windows is noted after each epoch. The network
+    is untrained, as `seeded_network` makes it with this seed; it is moved to the device and trained itself.
 
     Raises:
         InputError: `folder` belongs to another training, is damaged or cannot be written to.
-        ConfigError: the network does not fit the grids.
         DivergedError: the loss became NaN or infinite.
     """
-    check_grid_size(network_config, *windows.data.grids.shape[-2:])
+    network.to(device)
     key = {
-        "network": network_config.model_dump(),
-        "training": training_config.model_dump(),
+        "network": [type(network).__name__, network.version, network.settings.model_dump(mode="json")],
+        "given": asdict(network.given),
         "seed": seed,
         "windows": windows.digest(),
         "validation": validation.digest() if validation else None,
     }
     store = TrainingFolder(folder, digest_value(key))
-    dtype = choose_precision(training_config.precision, device)
     # Whoever else trains the same waits, and then finds it complete; what is complete need not be writable.
     with nullcontext() if store.is_complete() else locked(folder):
         if store.is_complete():
-            network, history = store.read(device)
+            history = store.read(network)
         else:
-            network = seeded_network(
-                network_config, grids=windows.grids_per_window, preset=training_config.optimizer_preset, seed=seed
-            ).to(device)
-            trainer = _Trainer(network, training_config, windows.to(device), seed, dtype)
+            trainer = _Trainer(network, windows.to(device), seed, device)
             history = trainer.run(store, validation.to(device) if validation else None, progress)
-    return Trained(network.eval(), tuple(history), sum(row.seconds for row in history), dtype)
-
-
-def masked_loss(logits: Tensor, target: Tensor, mask: Tensor) -> Tensor:
-    """Cross entropy without loss inside M, the mean over all cells (reading 10).
-
-    Logits (B, C, H, W), target (B, H, W) uint8, mask M (B, H, W) bool -> scalar. Taking the target for the prediction
-    inside M, as the paper's equation does, makes the loss there zero.
-    """
-    counted = target.long().masked_fill(mask, _IGNORED)
-    return F.cross_entropy(logits.float(), counted, ignore_index=_IGNORED, reduction="sum") / target.numel()
+    return Trained(network.eval(), tuple(history), sum(row.seconds for row in history))
 
 
 def draw_windows(count: int, needed: int, generator: torch.Generator) -> Tensor:
@@ -154,22 +86,14 @@ def draw_windows(count: int, needed: int, generator: torch.Generator) -> Tensor:
 class _Trainer:
     """Network, optimizer and windows of one training."""
 
-    def __init__(
-        self, network: EncoderDecoder, config: TrainingConfig, windows: WindowSet, seed: int, dtype: torch.dtype
-    ) -> None:
-        self._network = network
-        self._config = config
-        self._windows = windows
-        self._seed = seed
-        self._dtype = dtype
-        self._device = windows.data.grids.device
-        alpha, eps = (0.9, 1e-7) if config.optimizer_preset == "keras" else (0.99, 1e-8)
-        self._optimizer = torch.optim.RMSprop(network.parameters(), lr=config.learning_rate, alpha=alpha, eps=eps)
+    def __init__(self, network: Network, windows: WindowSet, seed: int, device: torch.device) -> None:
+        self._network, self._windows, self._seed, self._device = network, windows, seed, device
+        self._config = network.training_config
+        self._dtype = network.dtype_on(device)
+        self._optimizer = network.optimizer()
 
     def run(self, store: TrainingFolder, validation: WindowSet | None, progress: Progress) -> list[EpochRecord]:
         """Train from the checkpoint, or from the beginning, to the end."""
-        if self._device.type == "cpu":
-            keep_freed_memory()
         history = store.restore(self._network, self._optimizer)
         for epoch in range(len(history), self._config.epochs):
             # Each epoch has a seed of its own, so that no state of a generator needs to be kept.
@@ -180,7 +104,7 @@ class _Trainer:
             record = EpochRecord(
                 epoch=epoch + 1,
                 updates=self._config.updates_until(epoch + 1),
-                learning_rate=self._config.learning_rate_in(epoch),
+                learning_rate=self._config.schedule.rate_in(epoch),
                 loss=loss,
                 validation_loss=self._validation_loss(validation) if validation else None,
                 seconds=round(seconds, 3),
@@ -194,7 +118,7 @@ class _Trainer:
         """Make the updates of an epoch (counted from 0) and give their mean loss."""
         first, last = self._config.updates_until(epoch), self._config.updates_until(epoch + 1)
         for group in self._optimizer.param_groups:
-            group["lr"] = self._config.learning_rate_in(epoch)
+            group["lr"] = self._config.schedule.rate_in(epoch)
         self._network.train()
         generator = torch.Generator().manual_seed(_epoch_seed(self._seed, epoch))
         drawn = draw_windows(len(self._windows), (last - first) * self._config.batch, generator).to(self._device)
@@ -212,9 +136,7 @@ class _Trainer:
         return total.item() / (last - first)
 
     def _update(self, batch: WindowBatch) -> Tensor:
-        with autocast(self._device, self._dtype):
-            logits = self._network(batch.past)
-        loss = masked_loss(logits, batch.target, batch.mask)
+        loss = self._loss(batch)
         self._optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         if self._config.clip_norm is not None:
@@ -222,20 +144,24 @@ class _Trainer:
         self._optimizer.step()
         return loss.detach()
 
+    def _loss(self, batch: WindowBatch) -> Tensor:
+        with autocast(self._device, self._dtype):
+            logits = self._network(batch)
+        return self._network.loss(logits.float(), batch)
+
     def _validation_loss(self, windows: WindowSet) -> float:
         self._network.eval()
         total = 0.0
-        with torch.inference_mode(), autocast(self._device, self._dtype):
+        with torch.inference_mode():
             for batch in windows.batches(self._config.batch):
-                loss = masked_loss(self._network(batch.past), batch.target, batch.mask)
-                total += loss.item() * len(batch.target)
+                total += self._loss(batch).item() * len(batch.target)
         return total / len(windows)
 
     def _checked(self, loss: float, update: int) -> float:
         if not math.isfinite(loss):
             raise DivergedError(
                 f"training diverged: the loss is {loss} after {update} updates; "
-                f"try a learning_rate below {self._config.learning_rate:g} or set clip_norm"
+                f"try a learning_rate below {self._config.schedule.learning_rate:g} or set clip_norm"
             )
         return loss
 

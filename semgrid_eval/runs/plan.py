@@ -2,21 +2,32 @@
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from semgrid_eval.errors import InputError, SemgridError, first_line
+from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.checkpoint import HISTORY_FILE, read_history
 from semgrid_eval.models.device import torch_threads
+from semgrid_eval.models.network import Network, NetworkSettings, ScheduleConfig, TrainingConfig, seeded_network
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage, silent_stage
-from semgrid_eval.runs.matrix import Matrix, Row
-from semgrid_eval.runs.runner import RunOptions, Unit, make_worker, plan_units, units_of, wanted_keys
-from semgrid_eval.runs.unit import Training, Worker
+from semgrid_eval.runs.attempts import failure_of, make_worker
+from semgrid_eval.runs.job import Job, Training
+from semgrid_eval.runs.matrix import Matrix
+from semgrid_eval.runs.options import RunOptions
+from semgrid_eval.runs.units import Unit, plan_units, units_of, wanted_keys
+from semgrid_eval.runs.worker import Worker
 
 CALIBRATION_EPOCHS = 3
 CALIBRATION_UPDATES = 4
+SAMPLE = {
+    "epochs": CALIBRATION_EPOCHS,
+    "updates_per_epoch": CALIBRATION_UPDATES,
+    "epoch_unit": "batches",
+    "schedule": ScheduleConfig(),
+}
+"""What is measured of a training, however long it is and whatever its learning rate."""
 SCORING_SHARE = 0.4
 """Time of a forward pass against forward and backward together, as measured on CPUs; it prices validation."""
 
@@ -53,8 +64,8 @@ def plan_run(
     """
     wanted = wanted_keys(matrix, options.only)
     worker = make_worker(matrix, logs, out, options, stage)
-    for sources in worker.sources:
-        sources.prepare()
+    for data in worker.data:
+        data.prepare()
     units = {key: unit for key, unit in plan_units(matrix).items() if key in wanted}
     sharing: dict[str, list[str]] = {key: [] for key in units}
     for row in matrix.rows:
@@ -80,16 +91,20 @@ def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], speed: "_Speed
     """Plan one unit; `priced` collects the trainings that are counted already, which the unit may share."""
     try:
         job = worker.look(unit.row, unit.seed)
-        done = unit.row.built_in and worker.is_done(job)
-        if done or job.training is None or job.training.id in priced:
+        done = job.resolved.is_known and worker.is_done(job)
+        settings = job.resolved.settings
+        if done or not isinstance(settings, NetworkSettings) or not job.training or job.training.id in priced:
             return PlannedUnit(rows, unit.seed, len(job.scored), 0, 0, 0.0, done)
         made = _epochs_made(job.training)
-        updates = _updates_left(unit.row, made)
-        seconds = speed.seconds(unit.row, job.training, made) if updates else 0.0
-    except (SemgridError, RuntimeError, MemoryError) as error:  # torch runs out of memory by a RuntimeError
-        return PlannedUnit(rows, unit.seed, 0, 0, 0, 0.0, done=False, failure=first_line(error))
+        updates = _updates_left(settings.training, made)
+        seconds = speed.seconds(job, settings, made) if updates else 0.0
+    except Exception as error:
+        reason = failure_of(error, unit.row)
+        if reason is None:
+            raise
+        return PlannedUnit(rows, unit.seed, 0, 0, 0, 0.0, done=False, failure=reason)
     priced.add(job.training.id)
-    return PlannedUnit(rows, unit.seed, len(job.scored), updates, updates * unit.row.training.batch, seconds, done)
+    return PlannedUnit(rows, unit.seed, len(job.scored), updates, updates * settings.training.batch, seconds, done)
 
 
 def _epochs_made(training: Training) -> int:
@@ -100,39 +115,34 @@ def _epochs_made(training: Training) -> int:
         return 0
 
 
-def _updates_left(row: Row, epochs_made: int) -> int:
-    return row.training.updates_until(row.training.epochs) - row.training.updates_until(epochs_made)
+def _updates_left(config: TrainingConfig, epochs_made: int) -> int:
+    return config.updates_until(config.epochs) - config.updates_until(epochs_made)
 
 
 class _Speed:
-    """Seconds that trainings take, measured once for each shape of network, batch and input."""
+    """Seconds that trainings take, measured once for each build of network, batch and input."""
 
     def __init__(self, worker: Worker) -> None:
         self._worker = worker
-        self._seconds_by_shape: dict[str, float] = {}
+        self._seconds: dict[str, float] = {}
 
-    def seconds(self, row: Row, training: Training, epochs_made: int) -> float:
+    def seconds(self, job: Job, settings: NetworkSettings, epochs_made: int) -> float:
         """Estimate the rest of a training with its validation after each epoch."""
-        shape = digest_value(
-            [
-                row.network.model_dump(),
-                row.training.batch,
-                row.training.precision,
-                training.windows.grids_per_window,
-                list(training.windows.data.grids.shape[-2:]),
-            ]
+        sample = settings.model_copy(update={"training": settings.training.model_copy(update=SAMPLE)})
+        build = digest_value(
+            [job.row.model, job.resolved.version, sample.model_dump(mode="json"), asdict(job.row.given)]
         )
-        if shape not in self._seconds_by_shape:
-            self._seconds_by_shape[shape] = self._measure(row, training)
-        of_update = self._seconds_by_shape[shape]
-        validated = (row.training.epochs - epochs_made) * len(training.watched or ())
-        return of_update * (_updates_left(row, epochs_made) + SCORING_SHARE * validated / row.training.batch)
+        if build not in self._seconds:
+            self._seconds[build] = self._measure(job, sample)
+        config, watched = settings.training, job.training and job.training.watched
+        validated = (config.epochs - epochs_made) * len(watched or ())
+        return self._seconds[build] * (_updates_left(config, epochs_made) + SCORING_SHARE * validated / config.batch)
 
-    def _measure(self, row: Row, training: Training) -> float:
-        short = row.training.model_copy(
-            update={"epochs": CALIBRATION_EPOCHS, "updates_per_epoch": CALIBRATION_UPDATES, "epoch_unit": "batches"}
-        )
+    def _measure(self, job: Job, sample: NetworkSettings) -> float:
+        assert job.training is not None
+        assert issubclass(job.resolved.model, Network)
         with tempfile.TemporaryDirectory() as folder, torch_threads(self._worker.threads):
+            network = seeded_network(job.resolved.model, sample, job.row.given, seed=0)
             path = Path(folder) / "sample"
-            trained = train(training.windows, row.network, short, seed=0, device=self._worker.device, folder=path)
+            trained = train(network, job.training.windows, seed=0, device=self._worker.device, folder=path)
         return min(epoch.seconds for epoch in trained.history) / CALIBRATION_UPDATES

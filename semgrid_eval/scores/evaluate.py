@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.errors import InputError
 from semgrid_eval.grids.spec import MOVING, STANDING
-from semgrid_eval.models.predictor import Predictor
+from semgrid_eval.models.model import Model
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores.iou import Counts, confusion
 from semgrid_eval.windows.data import WindowBatch, WindowSet
@@ -39,7 +39,7 @@ class Evaluation:
 
 
 def evaluate(
-    predictor: Predictor,
+    model: Model,
     windows: WindowSet,
     *,
     mask_mode: MaskMode = "exclude",
@@ -58,7 +58,7 @@ def evaluate(
     seconds = 0.0
     if windows.target_frames.is_cuda:  # the first call loads kernels
         with torch.inference_mode():
-            predictor(_without_answer(windows.batch(slice(batch))))
+            model.predict(_without_answer(windows.batch(slice(batch))))
     for start in range(0, len(windows), batch):
         chosen = slice(start, start + batch)
         part = windows.batch(chosen)
@@ -66,7 +66,7 @@ def evaluate(
             torch.cuda.synchronize(part.target.device)
         start_s = time.perf_counter()
         with torch.inference_mode():
-            certainty, prediction = predictor(_without_answer(part)).max(dim=1)
+            certainty, prediction = model.predict(_without_answer(part)).max(dim=1)
             answer = prediction.to(torch.uint8).cpu().numpy()
         seconds += time.perf_counter() - start_s
         predictions.append(answer)

@@ -4,7 +4,8 @@ import torch
 
 from semgrid_eval.bench.material import random_windows
 from semgrid_eval.bench.textbook import prepare_window, train_by_the_book
-from semgrid_eval.models.network import NetworkConfig, one_hot_planes
+from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
+from semgrid_eval.models.network import one_hot_planes
 
 
 def test_a_window_prepared_by_itself_is_that_of_a_batch():
@@ -21,7 +22,12 @@ def test_a_window_prepared_by_itself_is_that_of_a_batch():
 
 def test_every_epoch_is_timed():
     seconds = train_by_the_book(
-        NetworkConfig(features=2, depth=2), random_windows(4), batch=1, updates=1, epochs=2, device=torch.device("cpu")
+        EncoderDecoderSettings(features=2, depth=2),
+        random_windows(4),
+        batch=1,
+        updates=1,
+        epochs=2,
+        device=torch.device("cpu"),
     )
     assert len(seconds) == 2
     assert min(seconds) > 0.0

@@ -11,8 +11,10 @@ from semgrid_eval.cli.main import cli, main
 from semgrid_eval.log.store import write_log
 from semgrid_eval.scores.results import read_run
 
-SMALL = {"window": {"step_frames": 3, "target_frame": 8}, "network": {"features": 4, "depth": 2}}
-TRAINING = {"epochs": 2, "updates_per_epoch": 3, "batch": 2}
+SMALL = {
+    "defaults": {"window": {"step_frames": 3, "target_frame": 8}},
+    "models": {"ed": {"features": 4, "depth": 2, "training": {"epochs": 2, "updates_per_epoch": 3, "batch": 2}}},
+}
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +46,7 @@ def example_of(command):
 
 def matrix(folder, rows):
     path = folder / "m.yaml"
-    path.write_text(yaml.safe_dump({"defaults": {**SMALL, "training": TRAINING}, "rows": rows}))
+    path.write_text(yaml.safe_dump({**SMALL, "rows": rows}))
     return str(path)
 
 
@@ -105,13 +107,14 @@ def test_dry_run_counts_a_training_that_rows_share_once(here):
 
 BAD_MODELS = """
 import torch
+from semgrid_eval.models.model import Model
 
-class Small:
-    def __call__(self, batch):
+class Small(Model):
+    def predict(self, batch):
         return torch.zeros(len(batch.target), 10, 4, 4)
 
-class NotANumber:
-    def __call__(self, batch):
+class NotANumber(Model):
+    def predict(self, batch):
         return torch.full((len(batch.target), 10, 128, 128), torch.nan)
 """
 

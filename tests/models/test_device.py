@@ -9,8 +9,9 @@ from semgrid_eval.models.device import (
     choose_device,
     choose_precision,
     cpu_has_bf16,
-    keep_freed_memory,
+    is_out_of_memory,
     seeded,
+    settle_process,
     visible_gpus,
 )
 
@@ -79,7 +80,27 @@ def test_seeded_block_repeats_and_leaves_the_generator_as_it_was():
     assert torch.equal(torch.get_rng_state(), state)
 
 
-def test_keeping_memory_changes_no_result():
+def test_settling_a_process_makes_cuda_repeatable_and_changes_no_result(monkeypatch):
+    monkeypatch.setattr(torch.backends.cudnn, "deterministic", False)
+    monkeypatch.setattr(torch.backends.cudnn, "allow_tf32", True)
     before = torch.ones(1 << 20).sum()
-    keep_freed_memory()
+    choose_device("cpu")
+    assert not torch.backends.cudnn.deterministic  # choosing sets nothing
+    settle_process()
+    assert torch.backends.cudnn.deterministic
+    assert not torch.backends.cudnn.allow_tf32
     assert torch.ones(1 << 20).sum() == before
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [
+        (torch.OutOfMemoryError("CUDA out of memory"), True),
+        (MemoryError(), True),
+        (RuntimeError("DefaultCPUAllocator: can't allocate memory"), True),
+        (RuntimeError("shapes do not match"), False),
+        (ValueError("can't allocate memory"), False),
+    ],
+)
+def test_a_lack_of_memory_is_told_from_other_errors(error, expected):
+    assert is_out_of_memory(error) is expected

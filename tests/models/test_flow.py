@@ -5,10 +5,12 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.models import given as given_by
+from support.models import made
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.models.baselines import FuseAll
-from semgrid_eval.models.flow import MOVABLE, FlowConfig, MoveOn, find_moves
+from semgrid_eval.models.flow import MOVABLE, FlowSettings, MoveOn, find_moves
+from semgrid_eval.models.overlay import FuseAll
 from semgrid_eval.windows.data import WindowBatch
 
 UNKNOWN, ROAD, BUILDING, CAR, PERSON = (
@@ -36,14 +38,18 @@ def batch_of(*grids, steps=1.0):
     return WindowBatch(past, ("full",), torch.zeros(1, count, 2, dtype=torch.int64), lead_s, target, target.bool())
 
 
+def flow(**settings):
+    return made(MoveOn, given_by(cell_m=CELL_M), **settings)
+
+
 def moved_on(*grids, steps=1.0, **config):
-    scores = MoveOn(FlowConfig(**config), CELL_M)(batch_of(*grids, steps=steps))
+    scores = flow(**config).predict(batch_of(*grids, steps=steps))
     assert torch.equal(scores.sum(dim=1), torch.ones(scores[:, 0].shape))
     return scores.argmax(dim=1)[0].numpy()
 
 
 def fused(*grids):
-    return FuseAll()(batch_of(*grids)).argmax(dim=1)[0].numpy()
+    return made(FuseAll).predict(batch_of(*grids)).argmax(dim=1)[0].numpy()
 
 
 @pytest.mark.parametrize(("steps", "ahead"), [(1.0, 3), (2.0, 6), (0.5, 2)])
@@ -76,8 +82,7 @@ def test_sensors_are_overlaid_before_anything_is_looked_for(count):
     halves[:, 0, :, :, :9] = UNKNOWN
     halves[:, 1, :, :, 9:] = UNKNOWN
     split = WindowBatch(halves, ("left", "right"), whole.shift_cells, whole.lead_s, whole.target, whole.mask)
-    model = MoveOn(FlowConfig(), CELL_M)
-    assert torch.equal(model(split), model(whole))
+    assert torch.equal(flow().predict(split), flow().predict(whole))
 
 
 STAYS = {
@@ -115,9 +120,9 @@ STAYS = {
 @pytest.mark.parametrize("case", STAYS)
 def test_each_piece_of_evidence_alone_keeps_cells_as_they_were_fused(case):
     older, newer, lax = STAYS[case]
-    assert find_moves(older, newer, GAP_S / CELL_M, FlowConfig()) == []
+    assert find_moves(older, newer, GAP_S / CELL_M, FlowSettings()) == []
     np.testing.assert_array_equal(moved_on(older, newer), fused(older, newer))
-    assert len(find_moves(older, newer, GAP_S / CELL_M, FlowConfig(**lax))) == 1
+    assert len(find_moves(older, newer, GAP_S / CELL_M, FlowSettings(**lax))) == 1
 
 
 def test_classes_do_not_turn_into_each_other():
@@ -129,7 +134,7 @@ def test_two_cars_in_a_lane_are_not_mixed_up():
     older = with_box(with_box(road(), 18, 8), 10, 8)
     newer = with_box(with_box(road(), 15, 8), 7, 8)
     np.testing.assert_array_equal(moved_on(older, newer), with_box(with_box(road(), 12, 8), 4, 8))
-    moves = find_moves(older, newer, GAP_S / CELL_M, FlowConfig())
+    moves = find_moves(older, newer, GAP_S / CELL_M, FlowSettings())
     assert [move.shift.tolist() for move in moves] == [[-3, 0]] * 2
 
 
@@ -147,7 +152,7 @@ def test_a_world_that_stands_still_but_flickers_is_fused(seed, count):
 def test_any_grids_give_classes_and_each_component_moves_once(seed):
     random = np.random.default_rng(seed)
     older, newer = (np.kron(random.integers(0, 10, (8, 8)), np.ones((2, 2))).astype(np.uint8) for _ in range(2))
-    config = FlowConfig(overlap=0, size_ratio=0, seen=0, still_there=1)
+    config = FlowSettings(overlap=0, size_ratio=0, seen=0, still_there=1)
     moves = find_moves(older, newer, 5.0, config)
     assert moved_on(older, newer, **config.model_dump()).max() < len(CLASS_NAMES)
     for grid, cells in ((older, [move.older for move in moves]), (newer, [move.newer for move in moves])):
@@ -163,4 +168,4 @@ def test_two_inputs_of_one_time_tell_no_motion():
     np.testing.assert_array_equal(moved_on(older, newer, steps=1.0), with_box(road(), 8, 8))
     batch = batch_of(older, newer)
     batch.lead_s[:] = GAP_S
-    assert torch.equal(MoveOn(FlowConfig(), CELL_M)(batch), FuseAll()(batch))
+    assert torch.equal(flow().predict(batch), made(FuseAll).predict(batch))

@@ -5,21 +5,21 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from support.models import network
 from support.recordings import drifting_blocks
 
-from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.config import parse_config
-from semgrid_eval.errors import ConfigError, InputError
-from semgrid_eval.models.checkpoint import CHECKPOINT_FILE, HISTORY_FILE, WEIGHTS_FILE
-from semgrid_eval.models.network import NetworkConfig, NetworkPredictor, load_network
-from semgrid_eval.models.training import DivergedError, TrainingConfig, draw_windows, masked_loss, train
+from semgrid_eval.errors import InputError
+from semgrid_eval.models.checkpoint import CHECKPOINT_FILE, HISTORY_FILE, WEIGHTS_FILE, load_weights
+from semgrid_eval.models.encoder_decoder import EncoderDecoder
+from semgrid_eval.models.network import Network, input_planes
+from semgrid_eval.models.training import DivergedError, draw_windows, train
+from semgrid_eval.progress import silent
 from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 CPU = torch.device("cpu")
-NETWORK = NetworkConfig(depth=2, features=4)
-QUICK = TrainingConfig(epochs=3, updates_per_epoch=3, batch=4, learning_rate_drop_epoch=2, precision="float32")
+QUICK = {"epochs": 3, "updates_per_epoch": 3, "batch": 4, "schedule": {"drop_epoch": 2}, "precision": "float32"}
 
 
 def windows_of(*seeds):
@@ -28,9 +28,10 @@ def windows_of(*seeds):
     return select_windows(data, plan.windows, sensors=["full"])
 
 
-def quick(folder, *, windows=None, config=QUICK, seed=1, **options):
+def quick(folder, *, windows=None, seed=1, progress=silent, validation=None, **training):
+    untrained = network(EncoderDecoder, seed=seed, depth=2, features=4, training=QUICK | training)
     windows = windows or windows_of(0, 1, 2)
-    return train(windows, NETWORK, config, seed=seed, device=CPU, folder=folder, **options)
+    return train(untrained, windows, seed=seed, device=CPU, folder=folder, progress=progress, validation=validation)
 
 
 class StopAfter:
@@ -45,39 +46,16 @@ class StopAfter:
             raise KeyboardInterrupt
 
 
-@given(seed=st.integers(0, 2**32 - 1), batch=st.integers(1, 3))
-def test_masked_loss_equals_replacing_the_prediction_by_the_target(seed, batch):
-    generator = torch.Generator().manual_seed(seed)
-    logits = torch.randn(batch, CLASS_COUNT, 3, 4, generator=generator)
-    target = torch.randint(0, CLASS_COUNT, (batch, 3, 4), generator=generator, dtype=torch.uint8)
-    mask = torch.rand(batch, 3, 4, generator=generator) < 0.4
-    total = 0.0
-    for b, row, column in [(b, r, c) for b in range(batch) for r in range(3) for c in range(4)]:
-        truth = torch.nn.functional.one_hot(target[b, row, column].long(), CLASS_COUNT).double()
-        predicted = logits[b, :, row, column].double().softmax(dim=0)
-        m = float(mask[b, row, column])
-        total -= float((truth * ((1 - m) * predicted + m * truth).clamp_min(1e-300).log()).sum())
-    assert masked_loss(logits, target, mask).item() == pytest.approx(total / mask.numel(), rel=1e-4, abs=1e-6)
-
-
-def test_cells_inside_the_mask_get_no_gradient():
-    logits = torch.randn(2, CLASS_COUNT, 4, 4, generator=torch.Generator().manual_seed(0), requires_grad=True)
-    target = torch.ones(2, 4, 4, dtype=torch.uint8)
-    mask = torch.zeros(2, 4, 4, dtype=torch.bool)
-    mask[:, 1:3] = True
-    masked_loss(logits, target, mask).backward()
-    assert torch.equal(logits.grad.abs().sum(dim=1) > 0, ~mask)
-
-
 @pytest.mark.parametrize("precision", ["float32", "bf16"])
 def test_network_learns_a_car_that_drives_right(tmp_path, precision):
     windows = windows_of(0, 1, 2, 3)
-    config = TrainingConfig(epochs=6, updates_per_epoch=50, batch=8, learning_rate_drop_epoch=4, precision=precision)
-    trained = train(windows, NetworkConfig(depth=2, features=8), config, seed=0, device=CPU, folder=tmp_path)
+    training = {"epochs": 6, "updates_per_epoch": 50, "batch": 8, "schedule": {"drop_epoch": 4}, "precision": precision}
+    untrained = network(EncoderDecoder, depth=2, features=8, training=training)
+    trained = train(untrained, windows, seed=0, device=CPU, folder=tmp_path)
     assert trained.history[-1].loss < 0.2 * trained.history[0].loss
     batch = windows.batch(slice(None))
     newest = batch.past[:, 0, -1].long()
-    predicted = NetworkPredictor(trained.network, trained.dtype)(batch).argmax(dim=1)
+    predicted = trained.network.predict(batch).argmax(dim=1)
     moved = newest != batch.target.long()
     assert (predicted == batch.target)[moved].float().mean() > 0.8
 
@@ -85,12 +63,11 @@ def test_network_learns_a_car_that_drives_right(tmp_path, precision):
 @pytest.mark.parametrize("calls", [1, 2, 3])
 def test_stopped_training_ends_in_the_same_bytes(tmp_path, calls):
     straight, stopped = tmp_path / "straight", tmp_path / "stopped"
-    config = QUICK.model_copy(update={"clip_norm": 1.0})
-    whole = quick(straight, config=config)
+    whole = quick(straight, clip_norm=1.0)
     with pytest.raises(KeyboardInterrupt):
-        quick(stopped, config=config, progress=StopAfter(calls))
+        quick(stopped, clip_norm=1.0, progress=StopAfter(calls))
     assert not (stopped / WEIGHTS_FILE).exists()
-    finished = quick(stopped, config=config)
+    finished = quick(stopped, clip_norm=1.0)
     assert (straight / WEIGHTS_FILE).read_bytes() == (stopped / WEIGHTS_FILE).read_bytes()
     assert [row[:5] for row in whole.history] == [row[:5] for row in finished.history]
     assert not (stopped / CHECKPOINT_FILE).exists()
@@ -109,9 +86,11 @@ def test_complete_training_is_read_and_not_repeated(tmp_path):
     again = quick(tmp_path, progress=StopAfter(1))
     assert again.history == first.history
     assert again.seconds == first.seconds
-    grids = windows_of(5).batch(slice(None)).past
-    assert torch.equal(again.network(grids), first.network(grids))
-    assert torch.equal(load_network(tmp_path / WEIGHTS_FILE)(grids), first.network(grids))
+    batch = windows_of(5).batch(slice(None))
+    assert torch.equal(again.network(batch), first.network(batch))
+    other = network(EncoderDecoder, seed=7, depth=2, features=4).eval()
+    load_weights(other, tmp_path / WEIGHTS_FILE)
+    assert torch.equal(other(batch), first.network(batch))
 
 
 def test_folder_of_another_training_is_refused(tmp_path):
@@ -160,24 +139,47 @@ def test_progress_counts_updates_to_the_end(tmp_path):
 
 
 def test_divergence_is_told_with_what_to_change(tmp_path):
-    config = QUICK.model_copy(update={"learning_rate": 1e30})
     with pytest.raises(DivergedError, match=r"training diverged: the loss is (nan|inf) after \d+ updates; try"):
-        quick(tmp_path, config=config)
-
-
-def test_papers_configuration_counts_as_the_readings_say():
-    paper = TrainingConfig()
-    assert paper.updates_until(40) * paper.batch == 236_800
-    assert [paper.learning_rate_in(epoch) for epoch in (0, 34, 35, 39)] == [1e-3, 1e-3, 1e-4, 1e-4]
-    assert TrainingConfig(epoch_unit="windows").updates_until(40) == 231
-    assert TrainingConfig(learning_rate_drop_epoch=None).learning_rate_in(39) == 1e-3
+        quick(tmp_path, schedule={"learning_rate": 1e30})
 
 
 def test_epochs_that_share_batches_make_every_update_once(tmp_path):
-    config = TrainingConfig(epochs=3, updates_per_epoch=7, batch=4, epoch_unit="windows", precision="float32")
-    assert [row.updates for row in quick(tmp_path, config=config).history] == [1, 3, 5]
-    with pytest.raises(ConfigError, match="an epoch of 7 windows does not fill a batch of 8"):
-        parse_config(TrainingConfig, {"updates_per_epoch": 7, "batch": 8, "epoch_unit": "windows"})
+    assert [row.updates for row in quick(tmp_path, updates_per_epoch=7, epoch_unit="windows").history] == [1, 3, 5]
+
+
+class Shifted(Network):
+    """Three lines of layers, and a loss and an optimiser of its own."""
+
+    family = "own"
+
+    def __init__(self, settings, given):
+        super().__init__(settings, given)
+        self.layer = torch.nn.Conv2d(given.planes, 10, 3, padding=1)
+
+    def forward(self, batch):
+        return self.layer(input_planes(batch.past))
+
+    def loss(self, logits, batch):
+        return 5.0 + super().loss(logits, batch)
+
+    def optimizer(self):
+        return torch.optim.SGD(self.parameters(), lr=self.training_config.schedule.learning_rate, momentum=0.9)
+
+
+def test_any_network_is_trained_with_its_own_loss_and_optimiser(tmp_path):
+    def trained(folder, progress=silent):
+        training = QUICK | {"schedule": {"learning_rate": 0.1, "drop_epoch": None}}
+        untrained = network(Shifted, training=training)
+        return train(untrained, windows_of(0), seed=0, device=CPU, folder=folder, progress=progress)
+
+    whole = trained(tmp_path / "a")
+    losses = [row.loss for row in whole.history]
+    assert losses == sorted(losses, reverse=True)
+    assert all(5.0 < loss < 8.0 for loss in losses)
+    with pytest.raises(KeyboardInterrupt):
+        trained(tmp_path / "b", StopAfter(2))
+    assert [row.loss for row in trained(tmp_path / "b").history] == losses  # the momentum, too, is in the checkpoint
+    assert (tmp_path / "a" / WEIGHTS_FILE).read_bytes() == (tmp_path / "b" / WEIGHTS_FILE).read_bytes()
 
 
 @given(count=st.integers(1, 9), needed=st.integers(1, 30), seed=st.integers(0, 1000))
@@ -188,8 +190,3 @@ def test_no_window_comes_again_before_all_were_drawn(count, needed, seed):
         part = drawn[start : start + count]
         assert len(set(part)) == len(part)
     assert set(drawn) <= set(range(count))
-
-
-def test_network_that_does_not_fit_the_grids_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="depth 6 needs grids of a multiple of 32 cells, not 16 x 16"):
-        train(windows_of(0), NetworkConfig(depth=6), QUICK, seed=0, device=CPU, folder=tmp_path)

@@ -6,7 +6,8 @@ import pytest
 import yaml
 
 from semgrid_eval.errors import ConfigError
-from semgrid_eval.models.predictor import ENTRY_POINT_GROUP
+from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
+from semgrid_eval.models.own import ENTRY_POINT_GROUP
 from semgrid_eval.runs.matrix import load_matrix, preset_names
 
 SCALED = ("paper-cpu", "architecture-cpu", "sensitivity")
@@ -27,14 +28,14 @@ def test_paper_has_the_rows_of_table_a1_in_its_order():
 def test_paper_trains_as_the_supplement_says():
     rows = {row.name: row for row in load_matrix("paper").rows}
     dc = rows["ED-DC"]
-    assert (dc.network.depth, dc.network.features, dc.window.inputs, dc.window.step_frames) == (3, 64, 2, 5)
-    assert (dc.training.epochs, dc.training.updates_per_epoch, dc.training.batch, dc.repeats) == (40, 185, 32, 20)
+    assert (dc.settings["depth"], dc.settings["features"], dc.window.inputs, dc.window.step_frames) == (3, 64, 2, 5)
+    training = dc.settings["training"]
+    assert (training["epochs"], training["updates_per_epoch"], training["batch"], dc.repeats) == (40, 185, 32, 20)
     assert [rows[f"ED-PH{k}"].window.horizon_steps for k in (1, 2, 3)] == [2, 3, 4]
     assert {row.window.target_frame for row in rows.values()} == {25}
     assert not rows["ED-NT"].translate
     assert not rows["BL-NT"].translate
-    differing = {"name", "experiment"}
-    assert rows["ED-SL2"].model_dump(exclude=differing) == dc.model_dump(exclude=differing)
+    assert rows["ED-SL2"].identity() == dc.identity()
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -43,10 +44,12 @@ def test_every_preset_loads(name):
 
 
 def test_axes_multiply_rows_and_fill_in_names(tmp_path):
-    axes = {"grid": {"network.depth": [2, 3]}, "zip": {"network.features": [16, 32], "training.batch": [8, 4]}}
-    row = {"name": "d{network.depth}-f{network.features}", "model": "ed", "axes": axes}
+    together = {"settings.features": [16, 32], "settings.training.batch": [8, 4]}
+    axes = {"grid": {"settings.depth": [2, 3]}, "zip": together}
+    row = {"name": "d{settings.depth}-f{settings.features}", "model": "ed", "axes": axes}
     rows = load(tmp_path, {"rows": [row]}).rows
-    assert [(r.name, r.network.depth, r.network.features, r.training.batch) for r in rows] == [
+    told = [(r.name, r.settings["depth"], r.settings["features"], r.settings["training"]["batch"]) for r in rows]
+    assert told == [
         ("d2-f16", 2, 16, 8),
         ("d2-f32", 2, 32, 4),
         ("d3-f16", 3, 16, 8),
@@ -71,15 +74,38 @@ def test_rows_override_defaults_key_by_key(tmp_path):
     ("rows", "message"),
     [
         (
-            [{"name": "a", "model": "ed", "netwrok": {}}],
-            r"m\.yaml: row 'a': netwrok: unknown key; .*network",
+            [{"name": "a", "model": "ed", "setings": {}}],
+            r"m\.yaml: row 'a': setings: unknown key; .*settings",
         ),
-        ([{"name": "a", "model": "ed", "network": {"debth": 3}}], r"row 'a': network\.debth: unknown key; .*depth"),
+        (
+            [{"name": "a", "model": "ed", "settings": {"debth": 3}}],
+            r"m\.yaml: row 'a': settings\.debth: unknown key; allowed here: constants, .*depth",
+        ),
+        (
+            [{"name": "a", "model": "ed", "settings": {"training": {"schedule": {"rate": 3}}}}],
+            r"settings\.training\.schedule\.rate: unknown key; allowed here: drop_epoch, learning_rate,",
+        ),
+        (
+            [{"name": "a", "model": "ed", "settings": {"training": {"batch": 0}}}],
+            r"settings\.training\.batch: .*\(found 0",
+        ),
+        ([{"name": "a", "model": "ed", "settings": 3}], "row 'a': settings: Input should be an object"),
+        ([{"name": "a", "model": "newest", "settings": {"x": 3}}], r"settings\.x: unknown key; allowed here: none$"),
+        (
+            [{"name": "a", "model": "ed", "settings": {"depth": 6}, "grid": {"spec": {"columns": 80}}}],
+            r"row 'a': settings: depth 6 needs grids of a multiple of 32 cells, not 128 x 80",
+        ),
         ([{"name": "a", "model": "de"}], "row 'a': .*'de' is not one of ed, newest, overlay, fuse, table, flow"),
         ([{"name": "a", "model": "ed", "sensors": ["left"]}], "row 'a': .*'left' is not one of full, split1_upper"),
-        ([{"name": "a", "model": "overlay"}], "overlay needs two sensors"),
-        ([{"name": "a", "model": "overlay", "sensors": ["full", "split1_lower"]}], "overlay needs two sensors"),
-        ([{"name": "a", "model": "overlay", "sensors": ["split1_upper"] * 2}], "overlay needs two sensors"),
+        ([{"name": "a", "model": "overlay"}], "settings.top: not one of .* alone has 'upper'"),
+        (
+            [{"name": "a", "model": "overlay", "sensors": ["full", "split1_lower"]}],
+            "settings.top: not one of .* alone has 'upper'",
+        ),
+        (
+            [{"name": "a", "model": "overlay", "sensors": ["split1_upper"] * 2}],
+            "settings.top: not one of .* alone has 'upper'",
+        ),
         ([{"name": "a", "model": "newest", "grid": {"class_map": {"car": "roadd"}}}], "row 'a': grid.*'roadd' is not"),
         (
             [{"name": "a", "model": "newest", "grid": {"spec": {"agent_row": 10**22}}}],
@@ -90,7 +116,7 @@ def test_rows_override_defaults_key_by_key(tmp_path):
             "agent's cell 128, 300 is outside",
         ),
         ([{"name": "a", "model": "ed"}, {"name": "a", "model": "newest"}], "rows.name: 'a' is the name of 2 rows"),
-        ([{"name": "a{network.depth}", "model": "ed"}], "has a place that no axis fills"),
+        ([{"name": "a{settings.depth}", "model": "ed"}], "has a place that no axis fills"),
         ([{"name": "a", "model": "ed", "axes": {"zip": {"x": [1], "y": [1, 2]}}}], "lists of 1 and 2 values"),
         ([{"name": "a", "model": "ed", "window": {"inputs": 9}}], "target_frame 25 is too early"),
         ([], "rows: there is no row"),
@@ -104,7 +130,7 @@ def test_faults_name_file_row_and_key(tmp_path, rows, message):
 def test_models_of_ones_own_are_rows_with_the_matrix_s_defaults(tmp_path):
     write(tmp_path, mine={"defaults": {"mask_mode": "off"}, "rows": [{"name": "a", "model": "newest"}]})
     rows = load_matrix(str(tmp_path / "mine.yaml"), models=["lib/mine.py:Mine", "mine.py:Other"]).rows
-    assert [(row.name, row.model, row.kind, row.mask_mode) for row in rows[1:]] == [
+    assert [(row.name, row.model, row.facts.family, row.mask_mode) for row in rows[1:]] == [
         ("Mine", "lib/mine.py:Mine", "Mine", "off"),
         ("Other", "mine.py:Other", "Other", "off"),
     ]
@@ -139,13 +165,16 @@ def write(folder, **files):
 
 
 def test_a_matrix_extends_another_one_beside_it_key_by_key(tmp_path):
-    rows = [{"name": name, "model": "ed", "network": {"depth": 2}} for name in ("a", "b", "c")]
-    write(tmp_path, base={"seed": 7, "title": "Base", "defaults": {"network": {"features": 8}}, "rows": rows})
-    changes = [{"name": "c", "network": {"features": 16}}, {"name": "d", "model": "newest"}]
-    write(tmp_path, mine={"extends": "base.yaml", "without": ["b"], "defaults": {"repeats": 2}, "rows": changes})
+    rows = [{"name": name, "model": "ed", "settings": {"depth": 2}} for name in ("a", "b", "c")]
+    base = {"seed": 7, "title": "Base", "models": {"ed": {"features": 8, "training": {"batch": 4}}}, "rows": rows}
+    changes = [{"name": "c", "settings": {"features": 16}}, {"name": "d", "model": "ed"}]
+    models = {"ed": {"training": {"epochs": 3}}}
+    mine = {"extends": "base.yaml", "without": ["b"], "models": models, "defaults": {"repeats": 2}, "rows": changes}
+    write(tmp_path, base=base, mine=mine)
     matrix = load_matrix(str(tmp_path / "mine.yaml"))
     assert (matrix.title, matrix.seed) == ("mine", 7)
-    assert [(row.name, row.network.depth, row.network.features, row.repeats) for row in matrix.rows] == [
+    assert {(row.settings["training"]["batch"], row.settings["training"]["epochs"]) for row in matrix.rows} == {(4, 3)}
+    assert [(row.name, row.settings["depth"], row.settings["features"], row.repeats) for row in matrix.rows] == [
         ("a", 2, 8, 2),
         ("c", 2, 16, 2),
         ("d", 3, 8, 2),
@@ -167,11 +196,13 @@ def test_paper_cpu_has_the_rows_of_paper_and_the_stronger_baselines():
         "BL-Table",
         "BL-Flow",
     ]
-    scaling = {"network", "training", "repeats"}
+    scaling = {"settings", "repeats"}
     for full, small in zip(paper, scaled, strict=False):
         assert full.model_dump(exclude=scaling) == small.model_dump(exclude=scaling)
-    assert {(row.network.features, row.training.batch, row.repeats) for row in scaled} == {(32, 8, 1)}
-    assert {row.training.updates_until(row.training.epochs) for row in scaled} == {2200}
+    trained = [EncoderDecoderSettings.model_validate(row.settings) for row in scaled if row.model == "ed"]
+    assert {(settings.features, settings.training.batch) for settings in trained} == {(32, 8)}
+    assert {settings.training.updates_until(settings.training.epochs) for settings in trained} == {2200}
+    assert {row.repeats for row in scaled} == {1}
 
 
 def test_real_trains_as_paper_cpu_and_scores_windows_that_fit_ten_frames():
@@ -197,10 +228,10 @@ def test_cpu_presets_share_the_training_of_paper_cpu():
 def test_longer_training_differs_from_paper_cpu_in_features_and_updates_alone():
     shared = next(row for row in load_matrix("paper-cpu").rows if row.name == "ED-DC")
     for row in load_matrix("updates-cpu").rows:
-        if row.trained:
-            training = row.training.model_copy(update={"updates_per_epoch": shared.training.updates_per_epoch})
-            assert training == shared.training
-            assert row.network == shared.network.model_copy(update={"features": 16})
+        if row.model == "ed":
+            updates = shared.settings["training"]["updates_per_epoch"]
+            training = row.settings["training"] | {"updates_per_epoch": updates}
+            assert row.settings | {"training": training} == shared.settings | {"features": 16}
 
 
 def test_a_validation_window_is_as_the_window_where_it_says_nothing(tmp_path):
@@ -224,10 +255,10 @@ def test_a_validation_window_is_as_the_window_where_it_says_nothing(tmp_path):
         ({"extends": "nowhere"}, r"mine\.yaml: extends: .*nowhere is neither a file nor a preset \(.*paper.*\)$"),
         ({"extends": "mine.yaml"}, r"mine\.yaml: extends: 'mine\.yaml' leads back to this file"),
         ({"extends": "back.yaml"}, r"mine\.yaml: extends: 'back\.yaml' leads back to this file"),
-        ({"extends": "broken.yaml"}, r"broken\.yaml: row 'a': netwrok: unknown key"),
+        ({"extends": "broken.yaml"}, r"broken\.yaml: row 'a': setings: unknown key"),
         (
-            {"extends": "good.yaml", "rows": [{"name": "a", "netwrok": {}}]},
-            r"mine\.yaml: row 'a': netwrok: unknown key",
+            {"extends": "good.yaml", "rows": [{"name": "a", "setings": {}}]},
+            r"mine\.yaml: row 'a': setings: unknown key",
         ),
         ({"extends": "good.yaml", "without": ["b"]}, r"mine\.yaml: without: 'b' is not a row of good\.yaml: a$"),
         ({"extends": "good.yaml", "without": ["a"]}, r"mine\.yaml: rows: there is no row"),
@@ -238,7 +269,10 @@ def test_a_validation_window_is_as_the_window_where_it_says_nothing(tmp_path):
         ({"extends": "good.yaml", "rows": [{"name": "a"}, {"name": "a", "model": "ed"}]}, "'a' is the name of 2 rows"),
         ({"extends": 3}, r"mine\.yaml: extends: .*string"),
         ({"without": ["a"], "rows": [{"name": "a", "model": "ed"}]}, "without: .* there is no `extends`"),
-        ({"extend": "paper"}, r"mine\.yaml: extend: unknown key; allowed here: defaults, extends, rows, seed, title"),
+        (
+            {"extend": "paper"},
+            r"mine\.yaml: extend: unknown key; allowed here: defaults, extends, models, rows,",
+        ),
     ],
 )
 def test_faults_of_extending_name_the_file_that_is_at_fault(tmp_path, mine, message):
@@ -247,7 +281,66 @@ def test_faults_of_extending_name_the_file_that_is_at_fault(tmp_path, mine, mess
         mine=mine,
         back={"extends": "mine.yaml"},
         good={"rows": [{"name": "a", "model": "newest"}]},
-        broken={"rows": [{"name": "a", "model": "newest", "netwrok": {}}]},
+        broken={"rows": [{"name": "a", "model": "newest", "setings": {}}]},
     )
     with pytest.raises(ConfigError, match=message):
         load_matrix(str(tmp_path / "mine.yaml"))
+
+
+def test_settings_of_a_model_lie_under_those_of_its_rows_alone(tmp_path):
+    row = {"name": "{model}-{settings.depth}", "axes": {"zip": {"model": ["ed", "ed"], "settings.depth": [2, 4]}}}
+    rows = [row, {"name": "f", "model": "ed", "settings": {"features": 8}}, {"name": "n", "model": "newest"}]
+    matrix = load(tmp_path, {"models": {"ed": {"features": 4, "depth": 5}}, "rows": rows})
+    told = {row.name: (row.settings.get("depth"), row.settings.get("features")) for row in matrix.rows}
+    assert told == {"ed-2": (2, 4), "ed-4": (4, 4), "f": (5, 8), "n": (None, None)}
+
+
+def test_settings_of_what_is_no_model_are_an_error(tmp_path):
+    with pytest.raises(ConfigError, match=r"m\.yaml: models\.edd: is not a model"):
+        load(tmp_path, {"models": {"edd": {}}, "rows": [{"name": "a", "model": "newest"}]})
+
+
+OWN = """
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.models.network import Network, NetworkSettings
+
+class Own(Network):
+    words = "an own network"
+
+    class Settings(NetworkSettings):
+        width: int = 3
+
+    @classmethod
+    def check(cls, settings, given):
+        if settings.width > given.columns:
+            raise ConfigError("is too wide", field="settings.width")
+"""
+
+
+def test_settings_of_ones_own_network_are_axes_and_checked_where_its_code_can_be_loaded(tmp_path):
+    (tmp_path / "own.py").write_text(OWN)
+    model = f"{tmp_path}/own.py:Own"
+    row = {"name": "w{settings.width}", "model": model, "repeats": 2, "axes": {"grid": {"settings.width": [4, 8]}}}
+    rows = load(tmp_path, {"models": {model: {"training": {"epochs": 2}}}, "rows": [row]}).rows
+    assert [(row.settings["width"], row.settings["training"]["epochs"]) for row in rows] == [(4, 2), (8, 2)]
+    assert rows[0].settings["training"]["batch"] == 32
+    assert rows[0].label.startswith("w4 (an own network, moved to the target's time")
+    assert (rows[0].facts.family, rows[0].facts.learns, rows[0].facts.baseline) == ("Own", True, False)
+    for settings, message in (({"widht": 4}, r"settings\.widht: unknown key"), ({"width": 999}, "width: is too wide")):
+        with pytest.raises(ConfigError, match=rf"m\.yaml: row 'a': .*{message}"):
+            load(tmp_path, {"rows": [{"name": "a", "model": model, "settings": settings}]})
+    (tmp_path / "own.py").write_text("def half(")
+    row = load(tmp_path, {"rows": [{"name": "a", "model": model, "settings": {"widht": 4}}]}).rows[0]
+    assert (row.settings, row.facts.family, row.facts.learns) == ({"widht": 4}, "Own", False)
+
+
+def test_facts_are_what_the_model_says(tmp_path):
+    rows = [{"name": name, "model": name} for name in ("ed", "newest", "table", "fuse", "flow")]
+    facts = {row.name: row.facts for row in load(tmp_path, {"rows": rows}).rows}
+    assert {name: (fact.family, fact.learns, fact.baseline) for name, fact in facts.items()} == {
+        "ed": ("ED", True, False),
+        "newest": ("BL", False, True),
+        "table": ("BL", True, True),
+        "fuse": ("BL", False, True),
+        "flow": ("BL", False, True),
+    }

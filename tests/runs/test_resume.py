@@ -9,10 +9,9 @@ from semgrid_eval.report.page.write import write_report
 
 KILLS = 20
 MATRIX = """
-defaults:
-  window: {step_frames: 3, target_frame: 8}
-  network: {features: 4, depth: 2}
-  training: {epochs: 6, updates_per_epoch: 4, batch: 2}
+defaults: {window: {step_frames: 3, target_frame: 8}}
+models:
+  ed: {features: 4, depth: 2, training: {epochs: 6, updates_per_epoch: 4, batch: 2}}
 rows:
 - {name: BL-DC, model: newest}
 - {name: ED-DC, model: ed, repeats: 2}

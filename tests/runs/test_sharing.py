@@ -16,10 +16,11 @@ from semgrid_eval.files import locked
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs import plan
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.runner import RunOptions, run_matrix
+from semgrid_eval.runs.options import RunOptions
+from semgrid_eval.runs.runner import run_matrix
 from semgrid_eval.scores import results
 
-TINY = {"network": {"features": 4, "depth": 2}, "training": {"epochs": 1, "updates_per_epoch": 2, "batch": 2}}
+TINY = {"ed": {"features": 4, "depth": 2, "training": {"epochs": 1, "updates_per_epoch": 2, "batch": 2}}}
 BL, ED = {"name": "BL", "model": "newest"}, {"name": "ED", "model": "ed"}
 
 
@@ -38,7 +39,7 @@ def work(logs, tmp_path):
     def run(rows, executor=None, only=()):
         window = {"step_frames": 1, "horizon_steps": 1, "target_frame": 6}
         path = tmp_path / "matrix.yaml"
-        path.write_text(yaml.safe_dump({"defaults": {"window": window, **TINY}, "rows": rows}))
+        path.write_text(yaml.safe_dump({"models": TINY, "defaults": {"window": window}, "rows": rows}))
         options = RunOptions("cpu", tmp_path / "grids", "test", only, executor or InProcess())
         return run_matrix(load_matrix(str(path)), logs, tmp_path / "run", options)
 
@@ -82,51 +83,6 @@ def test_a_misspelt_row_is_told_before_anything_is_built(work, tmp_path):
     assert not (tmp_path / "grids").exists()
 
 
-MODEL = """
-from pathlib import Path
-import torch
-from beside import WEIGHTS
-
-class Mine:
-    def __init__(self):
-        self.known = int(WEIGHTS.read_text())
-    def __call__(self, batch):
-        batch.lead_s.zero_()
-        batch.shift_cells.zero_()
-        return torch.nn.functional.one_hot((batch.past[:, 0, -1] * self.known).long(), 10).permute(0, 3, 1, 2).float()
-"""
-
-
-def test_a_model_with_other_weights_is_scored_anew_and_cannot_move_what_others_see(work, tmp_path):
-    (tmp_path / "beside.py").write_text(f"from pathlib import Path\nWEIGHTS = Path({str(tmp_path / 'weights')!r})\n")
-    (tmp_path / "mine.py").write_text(MODEL)
-    rows = [{"name": "Mine", "model": f"{tmp_path}/mine.py:Mine"}, BL]
-    found = {}
-    for known in (1, 0):
-        (tmp_path / "weights").write_text(str(known))
-        record = work(rows)
-        assert failures(record) == {"Mine": None, "BL": None}
-        for row in record.rows:
-            counts, _ = results.read_counts(results.result_folder(work.out, row.results[0]))
-            found[row.name, known] = counts.tolist()
-    assert found["Mine", 1] == found["BL", 1] == found["BL", 0]
-    assert found["Mine", 0] != found["Mine", 1]
-
-
-def test_models_of_two_folders_do_not_share_what_lies_beside_them(work, tmp_path):
-    rows = []
-    for known in (1, 0):
-        folder = tmp_path / f"version{known}"
-        folder.mkdir()
-        (folder / "weights").write_text(str(known))
-        (folder / "beside.py").write_text("from pathlib import Path\nWEIGHTS = Path(__file__).parent / 'weights'\n")
-        (folder / "mine.py").write_text(MODEL)
-        rows.append({"name": f"Mine{known}", "model": f"{folder}/mine.py:Mine"})
-    first, second = (row.results[0] for row in work(rows).rows)
-    counts = [results.read_counts(results.result_folder(work.out, name))[0] for name in (first, second)]
-    assert (counts[0] != counts[1]).any()
-
-
 def test_a_training_that_is_complete_is_read_without_writing(work):
     work([ED])
     (lock,) = (work.out / "trainings").rglob(".lock")
@@ -156,7 +112,7 @@ def test_what_libraries_raise_is_a_reason_and_the_others_go_on(work, monkeypatch
     def fail(*_args, **_kwargs):
         raise RuntimeError(message)
 
-    monkeypatch.setattr("semgrid_eval.runs.unit.train", fail)
+    monkeypatch.setattr("semgrid_eval.runs.worker.train", fail)
     assert failures(work([ED, BL])) == {"ED": told, "BL": None}
 
 
@@ -167,7 +123,7 @@ def test_a_row_whose_sample_cannot_be_trained_does_not_end_the_plan(work, logs, 
         raise torch.OutOfMemoryError("CUDA out of memory.\nTried to allocate")
 
     monkeypatch.setattr(plan, "train", fail)
-    (tmp_path / "matrix.yaml").write_text(yaml.safe_dump({"defaults": TINY, "rows": [ED, BL]}))
+    (tmp_path / "matrix.yaml").write_text(yaml.safe_dump({"models": TINY, "rows": [ED, BL]}))
     units = plan.plan_run(load_matrix(str(tmp_path / "matrix.yaml")), logs, work.out, work.options)
     assert units[0].rows == ("ED",)
     assert units[0].failure is not None

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 import torch
+from support.models import made
 from support.recordings import random_recording
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import InputError
-from semgrid_eval.models.baselines import RepeatNewest
+from semgrid_eval.models.model import Model
+from semgrid_eval.models.newest import RepeatNewest
 from semgrid_eval.scores.evaluate import evaluate
 from semgrid_eval.windows.data import select_windows, window_arrays
 from semgrid_eval.windows.grids import stack_recordings
@@ -33,7 +35,7 @@ def slow_counts(kept, prediction, wanted):
 @pytest.mark.parametrize("batch", [2, 16])
 def test_regions_equal_counting_cell_by_cell(batch):
     windows = windows_of(*(random_recording(seed, truth=seed != 2) for seed in range(5)))
-    scored = evaluate(RepeatNewest(), windows, batch=batch)
+    scored = evaluate(made(RepeatNewest), windows, batch=batch)
     kept = window_arrays(windows)
     np.testing.assert_array_equal(scored.counts, slow_counts(kept, scored.prediction, lambda flags: True))
     moving, standing = scored.region_counts["moving"], scored.region_counts["standing"]
@@ -45,7 +47,12 @@ def test_regions_equal_counting_cell_by_cell(batch):
 def test_class_and_certainty_are_those_of_the_largest_score_in_each_cell():
     scores = torch.rand(3, CLASS_COUNT, 16, 16, generator=torch.Generator().manual_seed(0)) * 1.2
     windows = windows_of(*(random_recording(seed) for seed in range(3)))
-    scored = evaluate(lambda batch: scores, windows)
+
+    class Fixed(Model):
+        def predict(self, batch):
+            return scores
+
+    scored = evaluate(made(Fixed), windows)
     for n, row, column in np.ndindex(scored.prediction.shape):
         cell = scores[n, :, row, column].tolist()
         assert scored.prediction[n, row, column] == cell.index(max(cell))
@@ -53,11 +60,11 @@ def test_class_and_certainty_are_those_of_the_largest_score_in_each_cell():
 
 
 def test_without_the_truth_there_are_no_regions():
-    assert evaluate(RepeatNewest(), windows_of(random_recording(0))).region_counts == {}
+    assert evaluate(made(RepeatNewest), windows_of(random_recording(0))).region_counts == {}
 
 
 def test_no_window_is_an_error():
     windows = windows_of(random_recording(0))
     empty = type(windows)(**{**vars(windows), "target_frames": windows.target_frames[:0]})
     with pytest.raises(InputError, match="no window to score"):
-        evaluate(RepeatNewest(), empty)
+        evaluate(made(RepeatNewest), empty)

@@ -7,7 +7,8 @@ from support.toy_world import street
 
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.runner import RunOptions, run_matrix
+from semgrid_eval.runs.options import RunOptions
+from semgrid_eval.runs.runner import run_matrix
 
 SPLIT = ["split2_upper", "split2_lower"]
 STEP_FRAMES, TARGET_FRAME = 2, 8
@@ -15,8 +16,13 @@ MODEL = """
 import torch
 
 
-class Fill:
-    def __call__(self, batch):
+from semgrid_eval.models.model import Model
+
+
+class Fill(Model):
+    files = ()
+
+    def predict(self, batch):
         newest, older = batch.past[:, :, -1].amax(dim=1), batch.past[:, :, 0].amax(dim=1)
         known = torch.where(newest > 0, newest, older)
         known = torch.where(known > 0, known, torch.ones_like(known))

@@ -6,11 +6,12 @@ from support.toy_world import street
 from semgrid_eval.executors import InProcess
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.runner import RunOptions, run_matrix
+from semgrid_eval.runs.options import RunOptions
+from semgrid_eval.runs.runner import run_matrix
 
 WINDOW = {"step_frames": 3, "target_frame": 8}
 SPLITS = ("train", "train", "val", "val")
-TINY = {"network": {"features": 4, "depth": 2}, "training": {"epochs": 2, "updates_per_epoch": 3, "batch": 2}}
+TINY = {"ed": {"features": 4, "depth": 2, "training": {"epochs": 2, "updates_per_epoch": 3, "batch": 2}}}
 
 
 def write_logs(folder):
@@ -24,6 +25,8 @@ def write_logs(folder):
 def run(rows, logs, out, executor=None, only=(), *, folders=None, **defaults):
     """Run rows with these defaults; `folders` gives options of the run."""
     path = out.parent / f"{out.name}.yaml"
-    path.write_text(yaml.safe_dump({"seed": 5, "defaults": {"window": WINDOW, **TINY, **defaults}, "rows": rows}))
+    path.write_text(
+        yaml.safe_dump({"seed": 5, "models": TINY, "defaults": {"window": WINDOW, **defaults}, "rows": rows})
+    )
     options = RunOptions("cpu", out.parent / "grids", "test", only, executor or InProcess(), **(folders or {}))
     return run_matrix(load_matrix(str(path)), logs, out, options)

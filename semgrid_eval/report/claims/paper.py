@@ -10,14 +10,14 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.scores.iou import category_iou
 
 PAPER_SETTINGS = {
-    "network.depth": ("depth", 3),
-    "network.features": ("features", 64),
-    "training.batch": ("batch", 32),
-    "training.epochs": ("epochs", 40),
-    "training.updates_per_epoch": ("updates an epoch", 185),
-    "training.learning_rate": ("learning rate", 1e-3),
-    "training.learning_rate_drop_epoch": ("learning rate dropped after epoch", 35),
-    "training.learning_rate_after_drop": ("learning rate then", 1e-4),
+    "settings.depth": ("depth", 3),
+    "settings.features": ("features", 64),
+    "settings.training.batch": ("batch", 32),
+    "settings.training.epochs": ("epochs", 40),
+    "settings.training.updates_per_epoch": ("updates an epoch", 185),
+    "settings.training.schedule.learning_rate": ("learning rate", 1e-3),
+    "settings.training.schedule.drop_epoch": ("learning rate dropped after epoch", 35),
+    "settings.training.schedule.rate_after_drop": ("learning rate then", 1e-4),
 }
 """What the supplement says of network and training: words and value by a result's setting."""
 PAPER_DATASET = "cityscapes"

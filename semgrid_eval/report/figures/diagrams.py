@@ -131,12 +131,12 @@ def _front_line(axes: Axes, builds: Sequence[Build]) -> None:
 
 def _build(entry: RowScores) -> Build | None:
     record, row = entry.row.results[0].record, entry.row.record
-    network: Any = record.config.get("network")
+    network: Any = record.config.get("settings")
     known = isinstance(network, dict) and {"depth", "features"} <= set(network)
     if entry.row.is_baseline or not known or not np.isfinite(entry.mean[HEADLINE]):
         return None
     rest = {key: value for key, value in network.items() if key not in ("depth", "features")}
-    setting = digest_value([{**record.config, "network": rest}, row.horizon_steps, str(entry.row.run)])
+    setting = digest_value([{**record.config, "settings": rest}, row.horizon_steps, str(entry.row.run)])
     depth, features = int(network["depth"]), int(network["features"])
     window_ms = float(np.mean(entry.row.window_ms))
     return Build(entry.row.name, depth, features, record.parameters, entry.estimate(HEADLINE), window_ms, setting)

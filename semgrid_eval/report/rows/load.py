@@ -66,7 +66,7 @@ class Result:
 
     @cached_property
     def settings(self) -> Mapping[str, Any]:
-        """All that determined it, nested settings under dotted names: `network.depth`."""
+        """All that determined it, nested settings under dotted names: `settings.depth`."""
         return _flat(self.record.config)
 
     @cached_property

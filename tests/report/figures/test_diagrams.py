@@ -22,7 +22,7 @@ def test_trained_rows_have_a_calibration_curve_and_sure_baselines_none(rows):
 
 
 def _built(row, depth, features, *, translate=True):
-    config = {"network": {"depth": depth, "features": features}, "translate": translate}
+    config = {"settings": {"depth": depth, "features": features}, "translate": translate}
     record = row.results[0].record.model_copy(update={"config": config})
     return replace(row, name=f"d{depth}f{features}", results=(replace(row.results[0], record=record),))
 

@@ -5,10 +5,13 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
-from support.recordings import random_recording, recording
+from support.models import given as given_by
+from support.models import made
+from support.recordings import recording
 
-from semgrid_eval.errors import InputError
-from semgrid_eval.models.baselines import FuseAll, OverlaySensors, RepeatNewest, overlay
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.models.newest import RepeatNewest
+from semgrid_eval.models.overlay import FuseAll, OverlaySensors, overlay
 from semgrid_eval.windows.data import WindowBatch, select_windows
 from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import Window
@@ -25,7 +28,7 @@ def batch_of(past, sensors):
 
 
 def predicted(predictor, batch):
-    scores = predictor(batch)
+    scores = predictor.predict(batch)
     assert torch.equal(scores.sum(dim=1), torch.ones(scores[:, 0].shape))
     return scores.argmax(dim=1)[0].tolist()
 
@@ -42,7 +45,7 @@ def test_overlay_takes_the_first_known_cell(seed, layers):
 
 def test_newest_grid_of_the_first_sensor_is_repeated():
     batch = batch_of([[[[1, 2]], [[3, 0]]], [[[4, 4]], [[5, 5]]]], ("full", "other"))
-    assert predicted(RepeatNewest(), batch) == [[3, 0]]
+    assert predicted(made(RepeatNewest), batch) == [[3, 0]]
 
 
 def test_translating_row_aligns_what_is_repeated():
@@ -51,25 +54,26 @@ def test_translating_row_aligns_what_is_repeated():
     data = stack_recordings([recording(grids, position_m=[[0, 0], [1, 0], [3, -1]])], cell_m=1.0)
     for translate, cell in ((True, (4, 1)), (False, (2, 2))):
         windows = select_windows(data, [Window(0, (0, 1), 2)], sensors=["full"], translate=translate)
-        assert RepeatNewest()(windows.batch(slice(0, 1))).argmax(dim=1)[0].nonzero().tolist() == [list(cell)]
+        assert made(RepeatNewest).predict(windows.batch(slice(0, 1))).argmax(dim=1)[0].nonzero().tolist() == [
+            list(cell)
+        ]
 
 
 def test_sensor_on_top_hides_the_other_where_it_knows_something():
     batch = batch_of([[[[9, 9, 9, 9]], [[0, 1, 2, 0]]], [[[9, 9, 9, 9]], [[3, 0, 4, 0]]]], (LOWER, UPPER))
-    assert predicted(OverlaySensors(UPPER), batch) == [[3, 1, 4, 0]]
-    assert predicted(OverlaySensors(LOWER), batch) == [[3, 1, 2, 0]]
+    assert predicted(made(OverlaySensors, top=UPPER), batch) == [[3, 1, 4, 0]]
+    assert predicted(made(OverlaySensors, top="lower"), batch) == [[3, 1, 2, 0]]
 
 
 def test_fusing_lets_time_win_over_sensors():
     older, newer = [[1, 1, 1, 0, 1]], [[2, 0, 0, 0, 0]]
     older_top, newer_top = [[3, 3, 0, 0, 3]], [[4, 4, 0, 0, 0]]
     lower, upper = [older, newer], [older_top, newer_top]
-    assert predicted(FuseAll(), batch_of([lower, upper], (LOWER, UPPER))) == [[2, 4, 1, 0, 1]]
-    assert predicted(FuseAll(), batch_of([upper, lower], (UPPER, LOWER))) == [[4, 4, 1, 0, 3]]
+    assert predicted(made(FuseAll), batch_of([lower, upper], (LOWER, UPPER))) == [[2, 4, 1, 0, 1]]
+    assert predicted(made(FuseAll), batch_of([upper, lower], (UPPER, LOWER))) == [[4, 4, 1, 0, 3]]
 
 
-def test_unknown_top_sensor_is_named():
-    data = stack_recordings([random_recording(0)], cell_m=0.5)
-    batch = select_windows(data, [Window(0, (0, 5), 10)], sensors=["full"]).batch(slice(0, 1))
-    with pytest.raises(InputError, match=r"overlay: no sensor 'upper' among full"):
-        OverlaySensors("upper")(batch)
+@pytest.mark.parametrize("sensors", [("full",), ("full", LOWER), (UPPER, UPPER)])
+def test_sensors_of_which_not_one_alone_is_on_top_are_refused(sensors):
+    with pytest.raises(ConfigError, match=rf"settings\.top: not one of {', '.join(sensors)} alone has 'upper'"):
+        OverlaySensors.check(OverlaySensors.Settings(), given_by(sensors=sensors))

@@ -13,13 +13,13 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.fingerprint import kept_fingerprints
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.progress import Stage
-from semgrid_eval.runs.matrix import Row
+from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.results import LogRecord
 from semgrid_eval.sources.benchmarks import published_fingerprints
 from semgrid_eval.windows.grids import GridData, stack_recordings
 
 
-class Sources:
+class RunData:
     """Grids of a folder of logs, made when a row first asks for them.
 
     Args:
@@ -55,7 +55,7 @@ class Sources:
             self._grids(config)
 
     def identify(self) -> None:
-        """Fingerprint the logs of benchmarks, so that a report can hold them against the published ones."""
+        """Fingerprint the logs of benchmarks, so that a report can compare them with the published ones."""
         records = [record for record in self.records.values() if published_fingerprints(record.dataset)]
         if records:
             logs = {record.digest: self._folder / record.path for record in records}
@@ -112,7 +112,7 @@ class Sources:
                     digest=recording.digest,
                     split=recording.split,
                     dataset=recording.dataset,
-                    group=getattr(recording, "group", ""),
+                    group=recording.group,
                 )
         return self._sets[key]
 

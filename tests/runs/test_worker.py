@@ -5,8 +5,10 @@ from support.toy_world import street
 
 from semgrid_eval.log.store import write_log
 from semgrid_eval.progress import silent_stage
-from semgrid_eval.runs.matrix import Matrix, Row
-from semgrid_eval.runs.runner import RunOptions, make_worker
+from semgrid_eval.runs.attempts import make_worker
+from semgrid_eval.runs.matrix import Matrix
+from semgrid_eval.runs.options import RunOptions
+from semgrid_eval.runs.row import Row
 from semgrid_eval.windows.plan import WindowConfig
 
 SHORT = WindowConfig(step_frames=2, target_frame=8)
@@ -32,7 +34,7 @@ ROWS = [
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("unit")
+    folder = tmp_path_factory.mktemp("worker")
     for i, (logs, split) in enumerate([("town", "train"), ("town", "val"), ("real", "val")]):
         write_log(street(i, frames=9 + i).recording(f"{logs}{i}", split), folder / logs / f"{i}.mcap")
     return folder
@@ -47,7 +49,7 @@ def worker(folder, scored):
 
 def told(job):
     """All that a job says of its windows."""
-    parts = (job.scored, job.counted, job.training and job.training.windows, job.training and job.training.watched)
+    parts = (job.scored, job.training and job.training.windows, job.training and job.training.watched)
     digests = [part and (part.digest(), part.translate, part.sensors) for part in parts]
     return job.result_id, job.windows_id, job.training and job.training.id, digests, job.left_out
 
@@ -57,7 +59,7 @@ def test_rows_are_resolved_as_by_a_worker_of_their_own(folder, scored):
     shared = worker(folder, scored)
     rows = [row for row in ROWS if not (scored and row.validation_split == "train")]  # the real logs have no such split
     for row in [*rows, *reversed(rows)]:
-        seed = 0 if row.trained else None
+        seed = 0 if row.model == "ed" else None
         assert told(shared.look(row, seed)) == told(worker(folder, scored).look(row, seed))
 
 

@@ -10,8 +10,8 @@ from semgrid_eval.executors import InProcess
 from semgrid_eval.log.fingerprint import fingerprint
 from semgrid_eval.log.store import write_log
 from semgrid_eval.progress import silent_stage
+from semgrid_eval.runs.data import RunData
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.sources import Sources
 
 
 @pytest.fixture(scope="module")
@@ -23,13 +23,13 @@ def logs(tmp_path_factory):
     return folder
 
 
-def sources(logs, cache):
+def data_of(logs, cache):
     rows = load_matrix("baselines").rows[:1]
-    return Sources(logs, cache, rows, executor=InProcess(), device=torch.device("cpu"), stage=silent_stage)
+    return RunData(logs, cache, rows, executor=InProcess(), device=torch.device("cpu"), stage=silent_stage)
 
 
 def test_the_logs_of_a_published_benchmark_alone_are_fingerprinted(logs, tmp_path):
-    found = sources(logs, tmp_path)
+    found = data_of(logs, tmp_path)
     found.prepare()
     assert {record.fingerprint for record in found.records.values()} == {None}
     found.identify()

@@ -1,0 +1,103 @@
+"""A model's file and what it imports from beside it, found while its code runs and at no other time."""
+
+import importlib
+import importlib.util
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.files import digest_files, digest_value
+
+
+class ModelFile:
+    """A Python file with its neighbours.
+
+    `sys.path` and `sys.modules` are as before whenever none of its code runs, so that the neighbours of two files may
+    have the same names. What the file imports while it is loaded is all that it can import from beside it: no
+    neighbour can take part in numbers that is not part of their id.
+
+    Args:
+        path: of the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.folder = path.resolve().parent
+        self._neighbours: dict[str, ModuleType] = {}
+        self._digest = ""
+        self._is_present = False
+
+    def load(self) -> ModuleType:
+        """Run the file, which may import what lies beside it.
+
+        Raises:
+            InputError: it is not a Python file.
+        """
+        # The name stays known, since dataclasses and pickle look a class's module up by it.
+        name = f"semgrid_eval_own_{digest_value(str(self._path.resolve()))}_{self._path.stem}"
+        spec = importlib.util.spec_from_file_location(name, self._path)
+        if not self._path.is_file() or spec is None or spec.loader is None:
+            raise InputError("is not a Python file; a model is given as path.py:Class", path=self._path)
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        before = set(sys.modules)
+        importlib.invalidate_caches()
+        sys.path.insert(0, str(self.folder))
+        # Bytecode is told from its source by seconds and size, which two versions of a file may share.
+        writes_bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+        try:
+            spec.loader.exec_module(module)
+        except BaseException:
+            del sys.modules[name]
+            raise
+        finally:
+            sys.dont_write_bytecode = writes_bytecode
+            sys.path.remove(str(self.folder))
+            self._take_neighbours(before)
+        self._digest = digest_files(self.sources())
+        return module
+
+    def sources(self) -> list[Path]:
+        """List the files that make the model: its own, and those that it imported from beside it."""
+        return [self._path, *sorted(Path(file) for each in self._neighbours.values() if (file := each.__file__))]
+
+    def is_current(self) -> bool:
+        """Tell whether these files are still what was run."""
+        try:
+            return self._digest == digest_files(self.sources())
+        except InputError:
+            return False
+
+    @contextmanager
+    def present(self) -> Iterator[None]:
+        """Let its code find the neighbours that it has imported, inside the block."""
+        if self._is_present:
+            yield
+            return
+        hidden = {name: sys.modules[name] for name in self._neighbours if name in sys.modules}
+        sys.modules.update(self._neighbours)
+        self._is_present = True
+        try:
+            yield
+        finally:
+            self._is_present = False
+            for name in self._neighbours:
+                sys.modules.pop(name, None)
+            sys.modules.update(hidden)
+
+    def _take_neighbours(self, before: set[str]) -> None:
+        """Keep what was loaded from beside the file out of `sys.modules`; other packages may stay."""
+        found = {name: module for name, module in sys.modules.items() if name.partition(".")[0] not in before}
+        self._neighbours = {name: module for name, module in found.items() if self._is_beside(name.partition(".")[0])}
+        for name in self._neighbours:
+            del sys.modules[name]
+
+    def _is_beside(self, package: str) -> bool:
+        """Tell whether a top-level module or package lies in the folder itself, and not in an environment below it."""
+        module = sys.modules.get(package)
+        if file := getattr(module, "__file__", None):
+            return Path(file).resolve().parent in (self.folder, self.folder / package)
+        return any(Path(place).resolve() == self.folder / package for place in getattr(module, "__path__", ()))

@@ -1,0 +1,133 @@
+"""The encoder-decoder (ED) of the paper: grids in, class scores of the target out (readings 4 to 7)."""
+
+from typing import Literal
+
+import torch
+from pydantic import Field, field_validator
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.models.model import Given
+from semgrid_eval.models.network import Constants, Network, NetworkSettings, input_planes
+from semgrid_eval.windows.data import WindowBatch
+
+Activation = Literal["linear", "relu"]
+DROPOUT_RATE = 0.5
+
+
+class EncoderDecoderSettings(NetworkSettings):
+    """Settings of an ED.
+
+    Args:
+        depth: encoder blocks, d.
+        features: channels of the first block, f.
+        decoder_activation: of the decoder's convolutions (reading 5).
+        constants: whose constants batch normalisation and initial weights follow (reading 7).
+    """
+
+    depth: int = Field(default=3, ge=2, le=6)
+    features: int = Field(default=64, ge=2, le=512)
+    decoder_activation: Activation = "linear"
+    constants: Constants = "keras"
+
+    @field_validator("features")
+    @classmethod
+    def _can_be_halved(cls, features: int) -> int:
+        if features % 2:
+            raise ValueError("features must be even, because the last block halves them")
+        return features
+
+
+class EncoderDecoder(Network):
+    """The ED: d encoder blocks with pooling between them, d - 1 decoder blocks with skip connections."""
+
+    Settings = EncoderDecoderSettings
+    family = "ED"
+
+    def __init__(self, settings: EncoderDecoderSettings, given: Given) -> None:
+        super().__init__(settings, given)
+        widths = [settings.features * 2**i for i in range(settings.depth)]
+        constants = settings.constants
+        self.encoder = nn.ModuleList(
+            _Block(inputs, outputs, activation="relu", constants=constants)
+            for inputs, outputs in zip([given.planes, *widths], widths, strict=False)
+        )
+        self.dropout = nn.Dropout(DROPOUT_RATE)
+        pairs = list(zip(widths[1:], widths[:-1], strict=True))[::-1]
+        self.up = nn.ModuleList(_Upsample(inputs, outputs) for inputs, outputs in pairs)
+        self.decoder = nn.ModuleList(
+            _Block(inputs, outputs, activation=settings.decoder_activation, constants=constants)
+            for inputs, outputs in pairs
+        )
+        self.narrow = nn.Conv2d(settings.features, settings.features // 2, 3, padding=1)
+        self.classify = nn.Conv2d(settings.features // 2, CLASS_COUNT, 1)
+        if constants == "keras":
+            self.apply(_initialise_as_keras)
+        self.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack this form
+
+    @classmethod
+    def in_words(cls, settings: EncoderDecoderSettings) -> str:
+        """Say what the model does."""
+        return f"encoder-decoder d {settings.depth}, f {settings.features}"
+
+    @classmethod
+    def check(cls, settings: EncoderDecoderSettings, given: Given) -> None:
+        """Refuse grids that cannot be halved d - 1 times."""
+        factor = 2 ** (settings.depth - 1)
+        if given.rows % factor or given.columns % factor:
+            size = f"{given.rows} x {given.columns}"
+            raise ConfigError(
+                f"depth {settings.depth} needs grids of a multiple of {factor} cells, not {size}", field="settings"
+            )
+
+    def forward(self, batch: WindowBatch) -> Tensor:
+        """Score the target: (B, C, H, W) logits."""
+        return self.from_planes(input_planes(batch.past))
+
+    def from_planes(self, planes: Tensor) -> Tensor:
+        """Score the target from class probabilities: (B, S * T * C, H, W) -> (B, C, H, W) logits."""
+        features, skips = planes, list[Tensor]()
+        for block in self.encoder:
+            features = block(F.max_pool2d(features, 2) if skips else features)
+            skips.append(features)
+        features = self.dropout(skips.pop())
+        for up, block in zip(self.up, self.decoder, strict=True):
+            features = block(torch.cat([skips.pop(), up(features)], dim=1))
+        return torch.as_tensor(self.classify(self.narrow(features)))
+
+
+class _Block(nn.Sequential):
+    """Twice: 3 x 3 convolution, batch normalisation, activation."""
+
+    def __init__(self, inputs: int, outputs: int, *, activation: Activation, constants: Constants) -> None:
+        layers: list[nn.Module] = []
+        for width in (inputs, outputs):
+            # A bias would be removed by the normalisation that follows.
+            layers += [nn.Conv2d(width, outputs, 3, padding=1, bias=False), _normalisation(outputs, constants)]
+            layers += [nn.ReLU(inplace=True)] if activation == "relu" else []
+        super().__init__(*layers)
+
+
+class _Upsample(nn.Module):
+    """Nearest neighbour times two, then a 2 x 2 convolution padded as Keras does: below and to the right."""
+
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.convolution = nn.Conv2d(inputs, outputs, 2)
+
+    def forward(self, features: Tensor) -> Tensor:
+        larger = F.interpolate(features, scale_factor=2, mode="nearest")
+        return torch.as_tensor(self.convolution(F.pad(larger, (0, 1, 0, 1))))
+
+
+def _normalisation(channels: int, constants: Constants) -> nn.BatchNorm2d:
+    return nn.BatchNorm2d(channels, eps=1e-3, momentum=0.01) if constants == "keras" else nn.BatchNorm2d(channels)
+
+
+def _initialise_as_keras(module: nn.Module) -> None:
+    if isinstance(module, nn.Conv2d):
+        nn.init.xavier_uniform_(module.weight)
+        if module.bias is not None:
+            nn.init.zeros_(module.bias)

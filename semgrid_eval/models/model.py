@@ -1,0 +1,125 @@
+"""What every model is to a run, built in or one's own: settings, what a row gives it, and its answer."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.config import Config
+from semgrid_eval.windows.data import WindowBatch, WindowSet
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a row gives its model, whatever the logs hold.
+
+    Args:
+        sensors: names of the inputs' sensors, in the order of S.
+        inputs: grids of each sensor, T.
+        rows: of a grid, H, and `columns` W.
+        cell_m: edge of a cell.
+        translate: whether inputs are moved into the target's place.
+    """
+
+    sensors: tuple[str, ...]
+    inputs: int
+    rows: int
+    columns: int
+    cell_m: float
+    translate: bool
+
+    @property
+    def grids(self) -> int:
+        """How many grids a model sees of a window, S times T."""
+        return len(self.sensors) * self.inputs
+
+    @property
+    def planes(self) -> int:
+        """Channels of these grids as one-hot planes, S times T times C."""
+        return self.grids * CLASS_COUNT
+
+
+class NoSettings(Config):
+    """Settings of a model that has none."""
+
+
+class Model:
+    """Base of all models: subclass it, answer in `predict`, and in `fit` learn from training windows.
+
+    What gradients train is a `models.network.Network`.
+
+    Args:
+        settings: of the class `Settings`, complete.
+        given: what the row gives it.
+    """
+
+    Settings: ClassVar[type[Config]] = NoSettings
+    """Strict configuration class of what a row may set under `settings`."""
+    words: ClassVar[str] = ""
+    """What it does, for labels; the name of the class, where it does not say."""
+    family: ClassVar[str] = ""
+    """How figures group models, like `BL`; of one's own the name of the class, where it does not say."""
+    baseline: ClassVar[bool] = False
+    """Whether other rows are measured against it."""
+    random: ClassVar[bool] = False
+    """Whether chance plays a part: rows are then repeated with seeds, and torch's generator is seeded with them."""
+    files: ClassVar[tuple[str, ...] | None] = None
+    """Files beside its module that it reads (weights): all of them, so that its results can be kept, or None."""
+    version: ClassVar[str] = "1"
+    """Part of all ids: counted up by whoever changes the numbers of a built-in model."""
+
+    def __init__(self, settings: Any, given: Given) -> None:  # noqa: ANN401 - of the class `Settings`
+        super().__init__()
+        self.settings, self.given = settings, given
+
+    @classmethod
+    def in_words(cls, settings: Any) -> str:  # noqa: ANN401 - of the class `Settings`
+        """Say what the model does with these settings, for labels."""
+        return cls.words or cls.__name__
+
+    @classmethod
+    def check(cls, settings: Any, given: Given) -> None:  # noqa: ANN401 - of the class `Settings`
+        """Refuse what a row cannot mean, before anything is read or trained.
+
+        Raises:
+            ConfigError: settings and what the row gives do not fit.
+        """
+
+    def fit(self, windows: WindowSet) -> None:
+        """Learn from training windows; a model that does not say how learns nothing."""
+
+    def predict(self, batch: WindowBatch) -> Tensor:
+        """Score a batch from its past and motion alone: (B, C, H, W) float.
+
+        The class with the largest score is predicted, and that score, between 0 and 1, is its certainty: class
+        probabilities where the model has them, one-hot where it has not.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no `predict`")
+
+    @classmethod
+    def learns(cls) -> bool:
+        """Whether it is fitted to training windows, by counts or by gradient."""
+        return cls.fit is not Model.fit
+
+
+class Baseline(Model):
+    """Base of the models that others are measured against."""
+
+    family = "BL"
+    baseline = True
+    files = ()
+
+
+def one_hot(classes: Tensor) -> Tensor:
+    """Turn class ids into certain scores: (B, H, W) uint8 -> (B, C, H, W) float32."""
+    ids = torch.arange(CLASS_COUNT, dtype=torch.uint8, device=classes.device)
+    return (classes[:, None] == ids[:, None, None]).float()
+
+
+def parameter_count(model: Model) -> int | None:
+    """Count the trained values of a torch module, None of anything else."""
+    if not isinstance(model, torch.nn.Module):
+        return None
+    return sum(parameter.numel() for parameter in model.parameters())

@@ -1,0 +1,204 @@
+"""Models of one's own: found by file or entry point, and guarded, so that every fault of their code is one line."""
+
+import importlib.metadata
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
+from semgrid_eval.config import Config
+from semgrid_eval.errors import InputError, SemgridError
+from semgrid_eval.files import digest_files, digest_value
+from semgrid_eval.models.beside import ModelFile
+from semgrid_eval.models.device import is_out_of_memory
+from semgrid_eval.models.model import Given, Model
+from semgrid_eval.models.network import Network, NetworkSettings
+from semgrid_eval.windows.data import WindowBatch, WindowSet
+
+ENTRY_POINT_GROUP = "semgrid_eval.models"
+_loaded: dict[str, tuple[ModelFile, type[Model]]] = {}
+
+
+def model_in_file(spec: str) -> type[Model]:
+    """Load the model that `path.py:Class` stands for; its file is run once, and again when it has changed.
+
+    Raises:
+        InputError: there is no such file or class, or running it failed.
+    """
+    return _from_file(spec)[1]
+
+
+def model_installed(name: str) -> type[Model]:
+    """Load the model that a package has registered.
+
+    Raises:
+        InputError: there is no such entry point, or loading it failed.
+    """
+    with _one_line(name):
+        cls = _entry_point(name).load()
+    return _guarded(cls, name, None)
+
+
+def version_in_file(spec: str) -> str:
+    """Digest a model's file, what it imports from beside it, and the `files` that it declares.
+
+    Raises:
+        InputError: it cannot be loaded, or lacks a declared file.
+    """
+    file, cls = _from_file(spec)
+    return digest_files([*file.sources(), *_declared(cls, file.folder, spec)])
+
+
+def version_installed(name: str) -> str:
+    """Digest an installed model's package, its version, the module of its class, and the `files` that it declares.
+
+    Raises:
+        InputError: it cannot be loaded, or lacks a declared file.
+    """
+    cls = model_installed(name)
+    module = Path(str(sys.modules[_entry_point(name).module].__file__))
+    return digest_value([installed_models()[name], digest_files([module, *_declared(cls, module.parent, name)])])
+
+
+def _from_file(spec: str) -> tuple[ModelFile, type[Model]]:
+    if spec not in _loaded or not _loaded[spec][0].is_current():
+        path, _, name = spec.rpartition(":")
+        file = ModelFile(Path(path))
+        with _one_line(path):
+            module = file.load()
+        if not hasattr(module, name):
+            raise InputError(f"defines no {name!r}", path=path)
+        _loaded[spec] = file, _guarded(getattr(module, name), spec, file)
+    return _loaded[spec]
+
+
+def _entry_point(name: str) -> importlib.metadata.EntryPoint:
+    known = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
+    if name not in known.names:
+        names = ", ".join(sorted(known.names)) or "none"
+        raise InputError(f"no model {name!r} is installed ({names} found); a file is given as path.py:Class")
+    return known[name]
+
+
+def installed_models() -> dict[str, str]:
+    """List the models that packages have registered: name -> package and version."""
+    found = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
+    return {entry.name: f"{entry.dist.name} {entry.dist.version}" if entry.dist else "" for entry in found}
+
+
+class _Guarded(Model):
+    """Stands before a class of one's own: its exceptions and wrong answers become one line that names it."""
+
+    _own_name: ClassVar[str]
+    _own_file: ClassVar[ModelFile | None]
+
+    def __init__(self, settings: Any, given: Given) -> None:  # noqa: ANN401 - of the class `Settings`
+        with self._guard():
+            super().__init__(settings, given)
+
+    def fit(self, windows: WindowSet) -> None:
+        with self._guard():
+            super().fit(windows)
+
+    def predict(self, batch: WindowBatch) -> Tensor:
+        with self._guard():
+            return self._checked(super().predict(batch), batch)
+
+    @contextmanager
+    def _guard(self) -> Iterator[None]:
+        with _one_line(self._own_name):
+            if self._own_file is None:
+                yield
+            else:
+                with self._own_file.present():
+                    yield
+
+    def _checked(self, scores: Tensor, batch: WindowBatch) -> Tensor:
+        fault = _fault(scores, batch)
+        if fault:
+            raise InputError(fault, field=self._own_name)
+        return scores
+
+
+class _GuardedNetwork(_Guarded, Network):
+    """Stands before a network of one's own, also while it is trained."""
+
+    def forward(self, batch: WindowBatch) -> Tensor:
+        # Windows in their order are views of what other rows see.
+        own = replace(batch, shift_cells=batch.shift_cells.clone(), lead_s=batch.lead_s.clone())
+        with self._guard():
+            logits = super().forward(own)
+        fault = _shape_fault(logits, batch)  # what is no number ends a training by its loss, which says more
+        if fault:
+            raise InputError(fault, field=self._own_name)
+        return logits
+
+    def loss(self, logits: Tensor, batch: WindowBatch) -> Tensor:
+        with self._guard():
+            loss = super().loss(logits, batch)
+        if not isinstance(loss, Tensor) or loss.ndim:
+            raise InputError("gave a loss that is not a tensor of one number", field=self._own_name)
+        return loss
+
+    def optimizer(self) -> torch.optim.Optimizer:
+        with self._guard():
+            return super().optimizer()
+
+
+def _guarded(cls: object, spec: str, file: ModelFile | None) -> type[Model]:
+    """Put a guard before a class of one's own, after looking whether it is a model at all."""
+    if not isinstance(cls, type) or not issubclass(cls, Model):
+        raise InputError("is not a class that has `Model` or `Network` as its base", field=spec)
+    base = NetworkSettings if issubclass(cls, Network) else Config
+    if not issubclass(cls.Settings, base):
+        raise InputError(f"has `Settings` that do not have `{base.__name__}` as their base", field=spec)
+    guard = _GuardedNetwork if issubclass(cls, Network) else _Guarded
+    facts = {"_own_name": spec, "_own_file": file, "family": cls.family or cls.__name__, "__module__": cls.__module__}
+    unfitted = {} if cls.learns() else {"fit": Model.fit}  # the guard's own would look as if it learned
+    return type(cls.__name__, (guard, cls), facts | unfitted)
+
+
+def _declared(cls: type[Model], folder: Path, spec: str) -> list[Path]:
+    paths = [folder / name for name in cls.files or ()]
+    for path in paths:
+        if not path.is_file():
+            raise InputError(f"declares the file {path.name}, which is not in {folder}", field=f"{spec}: files")
+    return paths
+
+
+@contextmanager
+def _one_line(name: str) -> Iterator[None]:
+    """Turn whatever code of one's own raises into one line, but for a lack of memory, which is not its fault."""
+    try:
+        yield
+    except SemgridError:
+        raise
+    except (Exception, SystemExit) as error:
+        if is_out_of_memory(error):
+            raise
+        raise InputError(f"raised {type(error).__name__}: {error}", field=name) from error
+
+
+def _fault(scores: object, batch: WindowBatch) -> str | None:
+    """Say in one line what is wrong with an answer, None where nothing is."""
+    fault = _shape_fault(scores, batch)
+    if fault is None and isinstance(scores, Tensor) and not bool(torch.isfinite(scores).all()):
+        return "gave scores that are NaN or infinite"
+    return fault
+
+
+def _shape_fault(scores: object, batch: WindowBatch) -> str | None:
+    if not isinstance(scores, Tensor):
+        return f"gave a {type(scores).__name__} where a tensor is needed"
+    count, rows, columns = batch.target.shape
+    if scores.ndim == 4 and scores.shape[1] < CLASS_COUNT and scores.shape[0] == count:
+        return f"scores {scores.shape[1]} classes, and {', '.join(CLASS_NAMES[scores.shape[1] :])} are missing"
+    if scores.shape != (count, CLASS_COUNT, rows, columns):
+        return f"gave shape {tuple(scores.shape)} where {(count, CLASS_COUNT, rows, columns)} is needed"
+    return None if scores.is_floating_point() else f"gave {scores.dtype} where a floating-point type is needed"

@@ -1,0 +1,83 @@
+"""The table of models, the only place where their names stand; one's own are given as `path.py:Class` or installed."""
+
+from importlib import import_module
+from typing import Any
+
+from semgrid_eval.config import parse_config
+from semgrid_eval.errors import ConfigError, InputError
+from semgrid_eval.models.model import Model
+from semgrid_eval.models.own import (
+    installed_models,
+    model_in_file,
+    model_installed,
+    version_in_file,
+    version_installed,
+)
+
+_HERE = "semgrid_eval.models"
+MODELS = {
+    "ed": f"{_HERE}.encoder_decoder:EncoderDecoder",
+    "newest": f"{_HERE}.newest:RepeatNewest",
+    "overlay": f"{_HERE}.overlay:OverlaySensors",
+    "fuse": f"{_HERE}.overlay:FuseAll",
+    "table": f"{_HERE}.table:ClassTable",
+    "flow": f"{_HERE}.flow:MoveOn",
+}
+"""Where the class of each built-in model lies; a new model is its module, its test and a line here."""
+
+
+def find_model(name: str) -> type[Model]:
+    """Find the class of a built-in, an installed or, as `path.py:Class`, one's own model.
+
+    Code of one's own runs with the rights of this process, and is checked as `models.own` says.
+
+    Raises:
+        InputError: there is no such model, or its code cannot be loaded.
+    """
+    if name in MODELS:
+        module, _, cls = MODELS[name].partition(":")
+        found: type[Model] = getattr(import_module(module), cls)
+        return found
+    return model_in_file(name) if ":" in name else model_installed(name)
+
+
+def version_of(name: str) -> str:
+    """Return what tells a model's code from other code of the same name, and the files that it declares; part of ids.
+
+    Raises:
+        InputError: there is no such model, its code cannot be loaded, or it lacks a declared file.
+    """
+    if name in MODELS:
+        return find_model(name).version
+    return version_in_file(name) if ":" in name else version_installed(name)
+
+
+def is_built_in(name: str) -> bool:
+    """Tell whether a model comes with this package."""
+    return name in MODELS
+
+
+def is_named(name: str) -> bool:
+    """Tell whether a name means a model, without loading one's own code."""
+    return name in MODELS or ":" in name or name in installed_models()
+
+
+def model_names() -> tuple[str, ...]:
+    """List the names of built-in and installed models."""
+    return tuple(dict.fromkeys([*MODELS, *installed_models()]))
+
+
+def complete_settings(name: str, settings: dict[str, Any]) -> dict[str, Any]:
+    """Return a model's settings with all defaults, as they are where its code cannot be loaded.
+
+    Raises:
+        ConfigError: names the setting at fault and, for a key, the allowed ones.
+    """
+    try:
+        model = find_model(name)
+    except InputError:  # told when the model is needed
+        return settings
+    try:
+        return parse_config(model.Settings, settings).model_dump(mode="json")
+    except ConfigError as error:
+        raise ConfigError(f"settings.{error}".replace("settings.(top level)", "settings")) from None

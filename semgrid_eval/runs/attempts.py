@@ -1,0 +1,135 @@
+"""Units tried one by one, in this process or wherever an executor sends them, and what became of each."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import NamedTuple
+
+import torch
+
+from semgrid_eval.errors import SemgridError, first_line
+from semgrid_eval.executors import NoRoomError
+from semgrid_eval.models.device import choose_device, is_out_of_memory, settle_process
+from semgrid_eval.models.registry import is_built_in
+from semgrid_eval.progress import Progress, Stage, silent, silent_stage
+from semgrid_eval.runs.data import RunData
+from semgrid_eval.runs.matrix import Matrix
+from semgrid_eval.runs.options import RunOptions
+from semgrid_eval.runs.record import Outcome
+from semgrid_eval.runs.row import Row
+from semgrid_eval.runs.units import Unit
+from semgrid_eval.runs.worker import Worker, Workplace
+
+
+def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:
+    """Make a worker of this process for the units of a matrix; it builds or reads grids when they are asked for.
+
+    Raises:
+        InputError: there is no log at all, or the device does not exist.
+    """
+    settle_process()
+    device = choose_device(options.device)
+    # Where others do the work, the grids here need no room on the device.
+    place = device if options.executor.parallel == 1 else torch.device("cpu")
+    made = partial(
+        RunData, cache=options.grids, rows=matrix.rows, executor=options.grid_executor, device=place, stage=stage
+    )
+    data = made(logs)
+    return Worker(
+        Workplace(
+            out=out,
+            trainings=options.trainings or out / "trainings",
+            data=data,
+            scored_data=made(options.validation_logs) if options.validation_logs else data,
+            device=device,
+            threads=options.executor.threads or torch.get_num_threads(),
+            example_seed=matrix.seed,
+            stage=stage,
+        )
+    )
+
+
+@contextmanager
+def unit_work(
+    matrix: Matrix, logs: Path, out: Path, options: RunOptions, worker: Worker
+) -> Iterator[tuple[Callable[[Unit], Outcome], Progress]]:
+    """Return the function that tries one unit, here or wherever the executor sends it, and who is told of each."""
+    if options.executor.parallel == 1:
+        yield partial(_attempt, worker), silent  # the stages of a unit show themselves
+        return
+    # Elsewhere the same folder may be another one: paths must not depend on where a process stands.
+    place = _Place(
+        matrix.model_dump_json(),
+        options.device,
+        logs.resolve(),
+        out.resolve(),
+        options.grids.resolve(),
+        options.validation_logs and options.validation_logs.resolve(),
+        options.trainings and options.trainings.resolve(),
+        options.executor.threads,
+    )
+    with worker.stage("rows") as progress:
+        yield partial(_attempt_elsewhere, place), progress
+
+
+def finished(worker: Worker, unit: Unit) -> Outcome | None:
+    """Find what an earlier run left of a unit."""
+    try:
+        job = worker.look(unit.row, unit.seed)
+    except (SemgridError, torch.OutOfMemoryError):
+        return None
+    return Outcome(job.result_id, None, job.left_out) if worker.is_done(job) else None
+
+
+def failure_of(error: Exception, row: Row) -> str | None:
+    """Say in one line why a row failed; None where the fault is ours and is to be seen whole."""
+    if isinstance(error, SemgridError):
+        return str(error)
+    if is_out_of_memory(error):
+        return f"out of memory: {first_line(error)}"
+    # What torch and its libraries raise, or code of one's own that they call.
+    if isinstance(error, RuntimeError) or not is_built_in(row.model):
+        return f"{type(error).__name__}: {first_line(error)}"
+    return None
+
+
+class _Place(NamedTuple):
+    """All that another process needs to work on a run; equal places share a worker."""
+
+    matrix: str
+    device: str
+    logs: Path
+    out: Path
+    grids: Path
+    validation_logs: Path | None
+    trainings: Path | None
+    threads: int | None
+
+
+def _attempt_elsewhere(place: _Place, unit: Unit) -> Outcome:
+    return _attempt(_worker_at(place), unit)
+
+
+@lru_cache(maxsize=1)
+def _worker_at(place: _Place) -> Worker:
+    """Make the worker of a process that gets units of one run; it keeps the grids between them."""
+    if place.threads is not None:
+        torch.set_num_threads(place.threads)  # torch may have been imported before its environment was set
+    options = RunOptions(
+        place.device, place.grids, command="", validation_logs=place.validation_logs, trainings=place.trainings
+    )
+    return make_worker(Matrix.model_validate_json(place.matrix), place.logs, place.out, options, silent_stage)
+
+
+def _attempt(worker: Worker, unit: Unit) -> Outcome:
+    try:
+        job = worker.run(unit.row, unit.seed)
+    except Exception as error:
+        reason = failure_of(error, unit.row)
+        if reason is None:
+            raise
+        if is_out_of_memory(error):
+            raise NoRoomError(reason) from error
+        return Outcome(None, reason, {})
+    return Outcome(job.result_id, None, job.left_out)

@@ -1,0 +1,152 @@
+"""A unit resolved: its model, windows, training and the ids under which all of it is kept."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+
+from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.config import Config
+from semgrid_eval.files import digest_value
+from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
+from semgrid_eval.models.device import choose_precision
+from semgrid_eval.models.model import Model
+from semgrid_eval.models.network import Network, NetworkSettings
+from semgrid_eval.models.registry import find_model, version_of
+from semgrid_eval.runs.data import grid_digest
+from semgrid_eval.runs.row import Row
+from semgrid_eval.scores import results
+from semgrid_eval.windows.data import WindowSet
+
+SCORING_VERSION = 2
+"""Counts changes to how windows are kept and scored; results of another version are made again."""
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """The model of a row with its settings.
+
+    Args:
+        version: tells its code, and files that it declares, from others of the same name.
+    """
+
+    model: type[Model]
+    settings: Config
+    version: str
+
+    @property
+    def is_network(self) -> bool:
+        """Whether gradients train it."""
+        return issubclass(self.model, Network)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether all files that its numbers depend on are known, so that its results can be kept."""
+        return self.model.files is not None
+
+
+@dataclass(frozen=True)
+class Training:
+    """What a row's model learns from; rows that ask for the same share it.
+
+    Args:
+        folder: of a network's weights and history.
+        watched: the windows whose loss a network's training notes.
+    """
+
+    id: str
+    folder: Path
+    windows: WindowSet
+    watched: WindowSet | None
+
+
+@dataclass(frozen=True)
+class Job:
+    """A row with one seed, resolved.
+
+    Args:
+        result_id: names the result's folder.
+        config: what determined it, for the record.
+        scored: validation windows; `windows_id` names their file.
+        training: what is learned from, if anything.
+        left_out: logs whose recordings are too short for the row's windows, and by how much.
+    """
+
+    row: Row
+    seed: int | None
+    resolved: Resolved
+    result_id: str
+    config: dict[str, object]
+    scored: WindowSet
+    windows_id: str
+    training: Training | None
+    left_out: dict[str, str]
+
+
+def resolve(row: Row) -> Resolved:
+    """Find a row's model.
+
+    Raises:
+        InputError: it cannot be loaded, or a file that it declares is missing.
+        ConfigError: it does not take the row's settings.
+    """
+    model = find_model(row.model)
+    return Resolved(model, row.settings_of(model), version_of(row.model))
+
+
+def id_of_training(
+    resolved: Resolved,
+    row: Row,
+    seed: int | None,
+    device: torch.device,
+    *,
+    threads: int,
+    windows: WindowSet,
+    watched: WindowSet | None,
+) -> str:
+    """Digest all that decides what a model learns."""
+    settings = resolved.settings
+    trained_in = choose_precision(settings.training.precision, device) if isinstance(settings, NetworkSettings) else ""
+    return digest_value(
+        {
+            "model": [resolved.model.__name__, resolved.version, settings.model_dump(mode="json")],
+            "precision": str(trained_in),
+            "device": device.type,
+            # Sums on a CPU are rounded by how many threads share them.
+            "threads": threads if device.type == "cpu" else None,
+            "seed": seed,
+            "windows": [windows.digest(), watched.digest() if watched else None],
+            "grids": [GRIDS, grid_digest(row.grid), list(CLASS_NAMES)],
+        }
+    )
+
+
+def id_of_windows(row: Row, scored: WindowSet) -> str:
+    """Digest what decides the windows that a run keeps."""
+    return digest_value([SCORING_VERSION, GRIDS, scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
+
+
+def target_key(row: Row, scored: WindowSet) -> str:
+    """Digest what rows must share to be subtracted: target frames of which logs, their grids, mask mode and split."""
+    frames = scored.target_frames.cpu().numpy()
+    owners, places = scored.data.locate(frames)
+    digests = [scored.data.digests[owner] for owner in owners]
+    targets = sorted(zip(digests, scored.data.stamps_ns[frames].tolist(), places.tolist(), strict=True))
+    grid = row.grid.target_identity()
+    return digest_value([targets, grid, row.mask_mode, row.validation_split, list(CLASS_NAMES)])
+
+
+def window_records(windows: WindowSet, log_of: dict[str, str]) -> tuple[results.WindowRecord, ...]:
+    """Describe windows for a result's record; `log_of` has the path of each recording's log."""
+    data = windows.data
+    frames, inputs = windows.target_frames.cpu().numpy(), windows.inputs.cpu().numpy()
+    return tuple(
+        results.WindowRecord(
+            recording=data.recordings[owner],
+            log=log_of[data.recordings[owner]],
+            target_frame=int(target),
+            target_stamp_ns=int(data.stamps_ns[frame]),
+            input_stamps_ns=tuple(data.stamps_ns[past].tolist()),
+        )
+        for frame, past, owner, target in zip(frames, inputs, *data.locate(frames), strict=True)
+    )

@@ -1,0 +1,86 @@
+"""The record of a run: what was asked, where, and what became of each row."""
+
+import datetime
+import time
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from semgrid_eval.runs.matrix import Matrix
+from semgrid_eval.runs.provenance import machine, versions
+from semgrid_eval.runs.row import Row
+from semgrid_eval.runs.units import units_of
+from semgrid_eval.runs.worker import Worker
+from semgrid_eval.scores import results
+
+
+class Outcome(NamedTuple):
+    """What became of a unit: the id of its result, or the reason why there is none."""
+
+    result_id: str | None
+    failure: str | None
+    left_out: dict[str, str]  # logs that gave no window, and why
+
+
+class Clock:
+    """When a run started."""
+
+    def __init__(self) -> None:
+        self.utc = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+        self._start_s = time.monotonic()
+
+    def seconds(self) -> float:
+        """Time since then."""
+        return round(time.monotonic() - self._start_s, 3)
+
+
+def run_record(
+    matrix: Matrix, command: str, started: Clock, worker: Worker, outcomes: Mapping[str, Outcome]
+) -> results.RunRecord:
+    """Describe a run as far as it has come; `outcomes` are by the keys of units."""
+    logs = [log for data in worker.data for log in data.records.values()]
+    failed: dict[str, str] = {}
+    for data in worker.data:  # a log to train on and one to score may have the same path in their folders
+        for log, reason in data.failed.items():
+            failed[log] = f"{failed[log]}; {reason}" if log in failed else reason
+    return results.RunRecord(
+        format_version=results.FORMAT_VERSION,
+        title=matrix.title,
+        command=command,
+        matrix=matrix.model_dump(mode="json"),
+        versions=versions(),
+        machine=machine(worker.device, worker.threads),
+        started=started.utc,
+        seconds=started.seconds(),
+        logs=tuple(sorted(logs, key=lambda log: log.path)),  # under one path, the log to score comes last
+        failed_logs=failed | _too_short(outcomes),
+        rows=tuple(_row_record(row, matrix.seed, outcomes) for row in matrix.rows),
+    )
+
+
+def _too_short(outcomes: Mapping[str, Outcome]) -> dict[str, str]:
+    """Name the logs that gave some row no window."""
+    found: dict[str, str] = {}
+    for outcome in outcomes.values():
+        for log, reason in outcome.left_out.items():
+            found.setdefault(log, f"{log}: {reason}")
+    return found
+
+
+def _row_record(row: Row, first_seed: int, outcomes: Mapping[str, Outcome]) -> results.RowRecord:
+    done = [outcomes[key] for key, _ in units_of(row, first_seed) if key in outcomes]
+    failures = [outcome.failure for outcome in done if outcome.failure is not None]
+    found = [outcome.result_id for outcome in done if outcome.result_id is not None]
+    return results.RowRecord(
+        facts=row.facts,
+        name=row.name,
+        experiment=row.name.removeprefix("BL-").removeprefix("ED-"),
+        model=row.facts.family,
+        label=row.label,
+        inputs=row.window.inputs,
+        step_frames=row.scored_window.step_frames,
+        horizon_steps=row.scored_window.horizon_steps,
+        sensors=row.sensors,
+        translate=row.translate,
+        results=tuple(found),
+        failure=failures[0] if failures else (None if done else results.NOT_RUN),
+    )

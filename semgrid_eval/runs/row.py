@@ -1,0 +1,125 @@
+"""One row of a matrix: an experiment with everything that determines it, and what it says of itself."""
+
+from typing import Any, Self
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from semgrid_eval.config import Config, parse_config
+from semgrid_eval.errors import InputError
+from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.models.model import Given, Model
+from semgrid_eval.models.registry import complete_settings, find_model, is_named, model_names
+from semgrid_eval.scores.evaluate import MaskMode
+from semgrid_eval.scores.results import RowFacts
+from semgrid_eval.windows.plan import WindowConfig
+
+
+def _target_sensors(known: dict[str, Any]) -> tuple[str, ...]:
+    """Return the sensors of the target of a row's grid, none where that is at fault itself."""
+    return known["grid"].target if "grid" in known else ()
+
+
+class Row(Config):
+    """One experiment with everything that determines it.
+
+    Args:
+        name: unique in the matrix, like `ED-Sp2`; axes fill in `{key}` places.
+        model: name of a built-in or installed model, or `path.py:Class` of one's own.
+        settings: of the model, complete unless its code cannot be loaded.
+        sensors: inputs, from the grid config's sensors; those of its target if not given.
+        translate: whether inputs are moved to the target's time (T2); the paper's NT rows do not.
+        mask_mode: what becomes of the mask M in scores (reading 9).
+        repeats: seeds of a model in which chance plays a part.
+        validation_window: where it differs from `window`, for recordings of another frame rate; what a file leaves out
+            is as in `window`, and the number of inputs has to be.
+    """
+
+    name: str = Field(min_length=1, max_length=200)
+    model: str
+    settings: dict[str, Any] = Field(default_factory=dict, validate_default=True)
+    grid: GridConfig = GridConfig()
+    sensors: tuple[str, ...] = Field(default_factory=_target_sensors, min_length=1)
+    translate: bool = True
+    mask_mode: MaskMode = "exclude"
+    repeats: int = Field(1, ge=1, le=1000)
+    train_split: str = "train"
+    validation_split: str = "val"
+    window: WindowConfig = WindowConfig()
+    validation_window: WindowConfig | None = None
+
+    @field_validator("settings")
+    @classmethod
+    def _complete(cls, settings: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        return complete_settings(info.data.get("model", ""), settings)
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        for sensor in self.sensors:
+            if sensor not in self.grid.sensors:
+                raise ValueError(f"sensor {sensor!r} is not one of {', '.join(self.grid.sensors)}")
+        if not is_named(self.model):
+            raise ValueError(f"model {self.model!r} is not one of {', '.join(model_names())} or path.py:Class")
+        if self.scored_window.inputs != self.window.inputs:
+            raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
+        if found := self.found_model():
+            found.check(self.settings_of(found), self.given)
+        return self
+
+    @property
+    def scored_window(self) -> WindowConfig:
+        """Windows that are scored."""
+        return self.validation_window or self.window
+
+    @property
+    def given(self) -> Given:
+        """What the row gives its model."""
+        spec = self.grid.spec
+        return Given(self.sensors, self.window.inputs, spec.rows, spec.columns, spec.cell_m, self.translate)
+
+    def found_model(self) -> type[Model] | None:
+        """Return the class of the row's model, None where its code cannot be loaded."""
+        try:
+            return find_model(self.model)
+        except InputError:  # told when the row's turn comes
+            return None
+
+    def settings_of(self, model: type[Model]) -> Config:
+        """Return the settings as the model takes them.
+
+        Raises:
+            ConfigError: they are not this model's.
+        """
+        return parse_config(model.Settings, self.settings)
+
+    def identity(self) -> dict[str, object]:
+        """Return what determines the row's numbers, besides code and logs: all but its name and repeats."""
+        return self.model_dump(mode="json", exclude={"name", "repeats"})
+
+    @property
+    def facts(self) -> RowFacts:
+        """What the row is, whatever it is called."""
+        found = self.found_model()
+        return RowFacts(
+            model=self.model,
+            family=found.family if found else self.model.rpartition(":")[2],
+            learns=found.learns() if found else False,
+            baseline=found.baseline if found else False,
+            inputs=self.window.inputs,
+            step_frames=self.scored_window.step_frames,
+            horizon_steps=self.scored_window.horizon_steps,
+            sensors=self.sensors,
+            translate=self.translate,
+        )
+
+    @property
+    def label(self) -> str:
+        """Name and, in words, what the row does; the horizon is always said (reading 2)."""
+        found = self.found_model()
+        horizon = self.scored_window.horizon_steps
+        parts = [
+            found.in_words(self.settings_of(found)) if found else self.model,
+            "moved to the target's time" if self.translate else "not moved",
+            f"{self.window.inputs} inputs",
+            f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead",
+        ]
+        return f"{self.name} ({', '.join(parts)})"

@@ -1,0 +1,240 @@
+"""Works on units of a run: one row with one seed, fitted if need be, scored, and kept under the digest of all of it."""
+
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+
+from semgrid_eval.arrays import write_arrays
+from semgrid_eval.errors import InputError, ResultError
+from semgrid_eval.files import atomic_folder, digest_value
+from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
+from semgrid_eval.models.device import seeded
+from semgrid_eval.models.model import Model, parameter_count
+from semgrid_eval.models.network import Network, seeded_network
+from semgrid_eval.models.training import train
+from semgrid_eval.progress import Stage
+from semgrid_eval.runs.data import RunData, grid_digest
+from semgrid_eval.runs.job import (
+    SCORING_VERSION,
+    Job,
+    Resolved,
+    Training,
+    id_of_training,
+    id_of_windows,
+    resolve,
+    target_key,
+    window_records,
+)
+from semgrid_eval.runs.row import Row
+from semgrid_eval.scores import results
+from semgrid_eval.scores.evaluate import Evaluation, evaluate
+from semgrid_eval.windows.data import WindowSet, select_windows, window_arrays
+from semgrid_eval.windows.plan import WindowConfig, WindowPlan, training_windows, validation_windows
+
+WindowPlanner = Callable[[Sequence[int], WindowConfig], WindowPlan]
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """Where and with what a worker works.
+
+    Args:
+        out: folder of the run.
+        trainings: folder of the trainings.
+        data: the grids to train on.
+        scored_data: the grids to score on, mostly the same.
+        device: where models run.
+        threads: of numeric libraries where the units are worked on, which may be another process.
+        example_seed: of the results whose predictions are kept for a report's examples.
+        stage: shows progress.
+    """
+
+    out: Path
+    trainings: Path
+    data: RunData
+    scored_data: RunData
+    device: torch.device
+    threads: int
+    example_seed: int
+    stage: Stage
+
+
+class Worker:
+    """Fits and scores single units; holds the grids that they share."""
+
+    def __init__(self, place: Workplace) -> None:
+        self._place = place
+        self.device, self.threads, self.stage = place.device, place.threads, place.stage
+        self._selected: dict[object, tuple[WindowSet, dict[int, str]]] = {}
+        self._kept: set[str] = set()  # ids of the windows that are known to lie in the run's folder
+
+    @property
+    def data(self) -> tuple[RunData, ...]:
+        """Where grids come from: one folder of logs, or one to train on and one to score on."""
+        return tuple(dict.fromkeys((self._place.data, self._place.scored_data)))
+
+    def look(self, row: Row, seed: int | None) -> Job:
+        """Resolve a row with one seed into its model, its windows, its training and the id of its result.
+
+        Raises:
+            SemgridError: the row cannot be run; the message says why.
+        """
+        resolved = resolve(row)
+        scored, left_out = self.scored_windows(row)
+        windows_id = id_of_windows(row, scored)
+        training = self._training(resolved, row, seed, scored) if resolved.model.learns() else None
+        config = {**row.identity(), "code": resolved.version}
+        learned = [training and training.id, seed]
+        result_id = digest_value([results.FORMAT_VERSION, SCORING_VERSION, config, windows_id, learned])
+        return Job(row, seed, resolved, result_id, config, scored, windows_id, training, left_out)
+
+    def scored_windows(self, row: Row) -> tuple[WindowSet, dict[str, str]]:
+        """Select the windows on which a row is scored, and say why some logs give none.
+
+        Raises:
+            SemgridError: there is no such window.
+        """
+        data = self._place.scored_data
+        scored, too_short = self._select(data, row, row.validation_split, row.scored_window, validation_windows)
+        return scored, {data.log_of[scored.data.recordings[index]]: why for index, why in too_short.items()}
+
+    def run(self, row: Row, seed: int | None) -> Job:
+        """Make sure that the result of a row with one seed lies in the run's folder, and return what was resolved.
+
+        Raises:
+            SemgridError: the row cannot be run; the message says why.
+        """
+        job = self.look(row, seed)
+        self._keep_windows(job.scored, job.windows_id)
+        if job.resolved.is_known and self.is_done(job):
+            return job
+        with seeded(seed or 0, self.device):
+            model, train_seconds = self._fitted(job)
+            with self.stage(f"score {row.name}") as progress:
+                evaluation = evaluate(model, job.scored, mask_mode=row.mask_mode, progress=progress)
+        record = self._result_record(job, model, train_seconds, evaluation.seconds)
+        folder = results.result_folder(self._place.out, job.result_id)
+        _keep_result(folder, record, evaluation, self._history(job), with_predictions=self._shows(seed))
+        return job
+
+    def is_done(self, job: Job) -> bool:
+        """Tell whether all that a job leaves lies in the run's folder."""
+        folder = results.result_folder(self._place.out, job.result_id)
+        with_history = self._history(job) is not None
+        return results.is_done(folder, with_predictions=self._shows(job.seed), with_history=with_history)
+
+    def _shows(self, seed: int | None) -> bool:
+        return seed in (None, self._place.example_seed)
+
+    def _history(self, job: Job) -> Path | None:
+        return job.training.folder / TRAINING_HISTORY_FILE if job.training and job.resolved.is_network else None
+
+    def _select(
+        self, data: RunData, row: Row, split: str, config: WindowConfig, plan: WindowPlanner
+    ) -> tuple[WindowSet, dict[int, str]]:
+        """Select windows once for all seeds and rows that share them, with the reasons why recordings are too short."""
+        key = (data, grid_digest(row.grid), split, config, row.sensors, row.translate, plan)
+        if key not in self._selected:
+            grids = data.data(row.grid, split)
+            planned = plan(grids.frame_counts, config)
+            windows = select_windows(grids, planned.windows, sensors=row.sensors, translate=row.translate)
+            self._selected[key] = windows, planned.too_short
+        return self._selected[key]
+
+    def _watched(self, row: Row, scored: WindowSet) -> WindowSet | None:
+        """Select the windows whose loss a training notes; they are the training logs' own, wherever it is scored.
+
+        So one training serves the scores on all sorts of logs.
+        """
+        data = self._place.data
+        if self._place.scored_data is data:
+            return scored
+        try:
+            return self._select(data, row, row.validation_split, row.window, validation_windows)[0]
+        except InputError:  # no such logs among them, and none is needed
+            return None
+
+    def _training(self, resolved: Resolved, row: Row, seed: int | None, scored: WindowSet) -> Training:
+        windows = self._select(self._place.data, row, row.train_split, row.window, training_windows)[0]
+        watched = self._watched(row, scored) if resolved.is_network else None
+        training_id = id_of_training(
+            resolved, row, seed, self.device, threads=self.threads, windows=windows, watched=watched
+        )
+        return Training(training_id, self._place.trainings / training_id, windows, watched)
+
+    def _fitted(self, job: Job) -> tuple[Model, float | None]:
+        """Return the job's model, ready to predict, and how many seconds gradients have trained it."""
+        made, settings, given = job.resolved.model, job.resolved.settings, job.row.given
+        if job.training and issubclass(made, Network):
+            return self._trained(job.training, seeded_network(made, settings, given, job.seed or 0), job)
+        model = made(settings, given)
+        if isinstance(model, torch.nn.Module):
+            model.to(self.device).eval()
+        if job.training:
+            with self.stage(f"fit {job.row.name}"):
+                model.fit(job.training.windows)
+        return model, None
+
+    def _trained(self, training: Training, network: Network, job: Job) -> tuple[Network, float]:
+        seed = job.seed or 0
+        with self.stage(f"train {job.row.name} (seed {seed})") as progress:
+            trained = train(
+                network,
+                training.windows,
+                seed=seed,
+                device=self.device,
+                folder=training.folder,
+                progress=progress,
+                validation=training.watched,
+            )
+        return trained.network, round(trained.seconds, 3)
+
+    def _result_record(
+        self, job: Job, model: Model, train_seconds: float | None, predict_seconds: float
+    ) -> results.ResultRecord:
+        return results.ResultRecord(
+            format_version=results.FORMAT_VERSION,
+            id=job.result_id,
+            facts=job.row.facts,
+            targets=target_key(job.row, job.scored),
+            lead_s=round(float(job.scored.lead_s[:, -1].median()), 6),
+            config=job.config,
+            log_digests=tuple(sorted(set(job.scored.data.digests))),
+            seed=job.seed,
+            windows_id=job.windows_id,
+            windows=window_records(job.scored, self._place.scored_data.log_of),
+            device=str(self.device),
+            train_seconds=train_seconds,
+            predict_seconds=round(predict_seconds, 6),
+            parameters=parameter_count(model),
+        )
+
+    def _keep_windows(self, windows: WindowSet, windows_id: str) -> None:
+        if windows_id in self._kept:
+            return
+        try:
+            results.read_windows(self._place.out, windows_id)
+        except ResultError:  # not there yet, or damaged
+            write_arrays(results.windows_file(self._place.out, windows_id), window_arrays(windows))
+        self._kept.add(windows_id)
+
+
+def _keep_result(
+    folder: Path,
+    record: results.ResultRecord,
+    evaluation: Evaluation,
+    history: Path | None,
+    *,
+    with_predictions: bool,
+) -> None:
+    with atomic_folder(folder) as partial:
+        results.write_counts(partial, evaluation.counts, evaluation.region_counts)
+        if with_predictions:
+            arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
+            write_arrays(partial / results.PREDICTIONS_FILE, arrays)
+        if history:
+            shutil.copyfile(history, partial / results.HISTORY_FILE)
+        results.write_result(partial, record)

@@ -1,0 +1,330 @@
+"""Models of one's own in a run: trained, kept, resumed and told apart by all that their numbers depend on."""
+
+import importlib.metadata
+
+import pytest
+import torch
+from support.small_runs import run, write_logs
+
+from semgrid_eval.executors import Processes
+from semgrid_eval.models.own import ENTRY_POINT_GROUP
+from semgrid_eval.runs import worker
+from semgrid_eval.scores import results
+from semgrid_eval.scores.iou import category_iou, class_iou
+
+NETWORK = """
+import torch
+from layers import SIZE
+from semgrid_eval.models.network import Network, NetworkSettings, input_planes
+
+class Small(Network):
+    class Settings(NetworkSettings):
+        width: int = 4
+
+    def __init__(self, settings, given):
+        super().__init__(settings, given)
+        self.layers = torch.nn.Sequential(
+            torch.nn.Conv2d(given.planes, settings.width, SIZE, padding=SIZE // 2),
+            torch.nn.Dropout(0.1),
+            torch.nn.Conv2d(settings.width, 10, 1),
+        )
+
+    def forward(self, batch):
+        return self.layers(input_planes(batch.past))
+
+    def loss(self, logits, batch):
+        return super().loss(logits, batch) + 0.01 * logits.square().mean()
+"""
+TRAINING = {"epochs": 2, "updates_per_epoch": 3, "batch": 2}
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    return write_logs(tmp_path_factory.mktemp("logs"))
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A network in a file, which imports its neighbour."""
+    folder = tmp_path / "models"
+    folder.mkdir()
+    (folder / "small.py").write_text(NETWORK)
+    (folder / "layers.py").write_text("SIZE = 3\n")
+    return f"{folder}/small.py:Small"
+
+
+def own_row(small, **more):
+    return {"name": "own", "model": small, "settings": {"training": TRAINING}, **more}
+
+
+def result_of(out, row):
+    assert row.failure is None, row.failure
+    return results.read_result(results.result_folder(out, row.results[0]))
+
+
+def score(out, record, name):
+    row = next(row for row in record.rows if row.name == name)
+    result_of(out, row)
+    counts = results.read_counts(results.result_folder(out, row.results[0]))[0]
+    return float(category_iou(class_iou(counts.sum(axis=0)))["mean_known"])
+
+
+def test_an_own_network_is_trained_like_a_built_in_one(logs, tmp_path, small):
+    axes = {"grid": {"settings.width": [4, 6]}}
+    row = own_row(small, repeats=2, axes=axes) | {"name": "w{settings.width}"}
+    out = tmp_path / "run"
+    record = run([row], logs, out)
+    assert [row.name for row in record.rows] == ["w4", "w6"]
+    found = [result_of(out, row) for row in record.rows]
+    assert [result.parameters for result in found] == [4 * (20 * 9 + 1) + 50, 6 * (20 * 9 + 1) + 70]
+    assert [result.seed for result in found] == [5, 5]
+    assert found[0].facts.learns
+    assert found[0].facts.family == "Small"
+    assert found[0].config["settings"]["training"]["epochs"] == 2
+    assert len({result for row in record.rows for result in row.results}) == 4
+    assert len(list((out / "trainings").iterdir())) == 4
+    history = results.read_history(results.result_folder(out, record.rows[0].results[0]))
+    assert list(history["epoch"]) == [1, 2]
+    before = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file() and path.name != "run.json"}
+    run([row], logs, out)  # nothing is trained or scored again
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+
+
+def test_an_own_network_ends_in_the_same_bytes_after_a_stop_and_in_other_processes(logs, tmp_path, small, monkeypatch):
+    def outputs(out):
+        files = [*out.glob("results/*/counts.npz"), *out.glob("trainings/*/weights.safetensors")]
+        return {str(path.relative_to(out)): path.read_bytes() for path in files}
+
+    whole, stopped, elsewhere = (tmp_path / name for name in ("whole", "stopped", "elsewhere"))
+    run([own_row(small)], logs, whole)
+    trained = worker.train
+
+    def stop_after_an_epoch(*arguments, **options):
+        def progress(done, total, message=""):
+            if done > 3:
+                raise KeyboardInterrupt
+
+        return trained(*arguments, **options | {"progress": progress})
+
+    monkeypatch.setattr(worker, "train", stop_after_an_epoch)
+    with pytest.raises(KeyboardInterrupt):
+        run([own_row(small)], logs, stopped)
+    assert len(list(stopped.glob("trainings/*/checkpoint.pt"))) == 1
+    monkeypatch.undo()
+    run([own_row(small)], logs, stopped)
+    run([own_row(small)], logs, elsewhere, Processes(2, threads=torch.get_num_threads()))
+    assert len(outputs(whole)) == 2
+    assert outputs(whole) == outputs(stopped) == outputs(elsewhere)
+
+
+def test_a_network_is_told_apart_by_its_file_its_neighbours_and_its_settings(logs, tmp_path, small):
+    folder, out = tmp_path / "models", tmp_path / "run"
+    changes = [
+        ("small.py", NETWORK),
+        ("small.py", NETWORK + "\n# changed"),
+        ("layers.py", "SIZE = 5\n"),
+        ("unused.py", "changed\n"),
+    ]
+    found = []
+    for name, text in changes:
+        (folder / name).write_text(text)
+        (row,) = run([own_row(small)], logs, out).rows
+        found.append((result_of(out, row).id, len(list((out / "trainings").iterdir()))))
+    assert [trainings for _, trainings in found] == [1, 2, 3, 3]
+    assert len({result for result, _ in found}) == 3
+    assert found[3] == found[2]
+    (row,) = run([own_row(small) | {"settings": {"width": 2, "training": TRAINING}}], logs, out).rows
+    assert result_of(out, row).id not in dict(found)
+
+
+PREDICTOR = """
+from pathlib import Path
+from semgrid_eval.models.model import Model, one_hot
+
+class Mine(Model):
+    files = FILES
+
+    def __init__(self, settings, given):
+        super().__init__(settings, given)
+        self.known = int(Path(__file__).with_name("weights.txt").read_text())
+
+    def predict(self, batch):
+        return one_hot(batch.past[:, 0, -1] * self.known)
+"""
+
+
+@pytest.mark.parametrize(("files", "kept"), [('("weights.txt",)', True), ("None", False)])
+def test_a_predictor_that_declares_its_weights_is_kept_and_another_is_scored_again(logs, tmp_path, files, kept):
+    (tmp_path / "mine.py").write_text(PREDICTOR.replace("FILES", files))
+    rows, out = [{"name": "mine", "model": f"{tmp_path}/mine.py:Mine"}], tmp_path / "run"
+    found = []
+    for weights in ("1", "1", "0"):
+        (tmp_path / "weights.txt").write_text(weights)
+        (row,) = run(rows, logs, out).rows
+        file = results.result_folder(out, row.results[0]) / "counts.npz"
+        found.append((row.results[0], file.stat().st_mtime_ns))
+    assert (found[1] == found[0]) is kept
+    assert found[1][0] == found[0][0]
+    assert (found[2][0] != found[1][0]) is kept  # what is not declared is not known, and replaces what was there
+    assert not run(rows, logs, out, only=("mine",)).rows[0].failure
+
+
+def test_a_declared_file_that_is_missing_fails_its_row_alone(logs, tmp_path):
+    (tmp_path / "mine.py").write_text(PREDICTOR.replace("FILES", '("weights.bin",)'))
+    rows = [{"name": "mine", "model": f"{tmp_path}/mine.py:Mine"}, {"name": "BL-DC", "model": "newest"}]
+    record = run(rows, logs, tmp_path / "run")
+    assert "mine.py:Mine: files: declares the file weights.bin, which is not in" in str(record.rows[0].failure)
+    assert record.rows[1].failure is None
+
+
+FAULTY = """
+import torch
+from pathlib import Path
+from semgrid_eval.models.model import Model, one_hot
+from semgrid_eval.models.network import Network, input_planes
+
+class Greedy(Model):
+    def predict(self, batch):
+        seen = Path(__file__).with_name("seen")
+        if not seen.exists():
+            seen.touch()
+            raise torch.OutOfMemoryError("CUDA out of memory.\\nTried to allocate")
+        return one_hot(batch.past[:, 0, -1])
+
+class Wrong(Network):
+    def __init__(self, settings, given):
+        super().__init__(settings, given)
+        self.layer = torch.nn.Conv2d(given.planes, 9, 1)
+
+    def forward(self, batch):
+        return self.layer(input_planes(batch.past))
+
+class Function(torch.autograd.Function):
+    @staticmethod
+    def forward(context, values):
+        return values * 1.0
+
+    @staticmethod
+    def backward(context, gradient):
+        raise KeyError("gone")
+
+class Backward(Wrong):
+    def forward(self, batch):
+        return torch.nn.functional.pad(Function.apply(super().forward(batch)), (0, 0, 0, 0, 0, 1))
+"""
+
+
+def test_an_own_model_without_room_is_tried_again_alone(logs, tmp_path):
+    (tmp_path / "faulty.py").write_text(FAULTY)
+    rows = [{"name": "own", "model": f"{tmp_path}/faulty.py:Greedy"}, {"name": "BL-DC", "model": "newest"}]
+    record = run(rows, logs, tmp_path / "run", Processes(2, threads=1))
+    assert [row.failure for row in record.rows] == [None, None]
+    assert score(tmp_path / "run", record, "own") == score(tmp_path / "run", record, "BL-DC")
+    (tmp_path / "seen").unlink()
+    record = run(rows, logs, tmp_path / "again")
+    assert record.rows[0].failure == "out of memory: CUDA out of memory."
+
+
+def test_faults_of_a_network_while_it_is_trained_are_one_line_each(logs, tmp_path):
+    (tmp_path / "faulty.py").write_text(FAULTY)
+    rows = [
+        {"name": name, "model": f"{tmp_path}/faulty.py:{name}", "settings": {"training": dict(TRAINING)}}
+        for name in ("Wrong", "Backward")
+    ]
+    record = run([*rows, {"name": "BL-DC", "model": "newest"}], logs, tmp_path / "run")
+    assert [row.failure for row in record.rows] == [
+        f"{tmp_path}/faulty.py:Wrong: scores 9 classes, and bicycle are missing",
+        "KeyError: 'gone'",
+        None,
+    ]
+
+
+def test_a_model_of_ones_own_is_scored_like_any_other(logs, tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "from semgrid_eval.models.model import Model, one_hot\n"
+        "class Newest(Model):\n"
+        "    def predict(self, batch):\n"
+        "        return one_hot(batch.past[:, 0, -1])\n"
+    )
+    rows = [{"name": "mine", "model": f"{tmp_path}/mine.py:Newest"}, {"name": "BL-DC", "model": "newest"}]
+    record = run(rows, logs, tmp_path / "run")
+    assert score(tmp_path / "run", record, "mine") == score(tmp_path / "run", record, "BL-DC")
+
+
+def test_an_installed_model_is_scored_and_its_package_is_part_of_the_record(logs, tmp_path, monkeypatch):
+    value = "semgrid_eval.models.newest:RepeatNewest"
+    found = [importlib.metadata.EntryPoint(name, value, ENTRY_POINT_GROUP) for name in ("mine", "newest")]
+    monkeypatch.setattr(
+        importlib.metadata, "entry_points", lambda *, group: importlib.metadata.EntryPoints(found).select(group=group)
+    )
+    record = run([{"name": "mine", "model": "mine"}, {"name": "BL-DC", "model": "newest"}], logs, tmp_path / "run")
+    assert score(tmp_path / "run", record, "mine") == score(tmp_path / "run", record, "BL-DC")
+    configs = [
+        results.read_result(results.result_folder(tmp_path / "run", row.results[0])).config for row in record.rows
+    ]
+    assert configs[0]["code"] != configs[1]["code"]
+
+
+def test_a_model_that_cheats_or_leaves_is_stopped(logs, tmp_path):
+    (tmp_path / "bad.py").write_text(
+        "import torch\n"
+        "from semgrid_eval.models.model import Model\n"
+        "class Peeks(Model):\n"
+        "    def predict(self, batch):\n"
+        "        batch.mask.fill_(True)\n"
+        "        return torch.nn.functional.one_hot(batch.target.long(), 10).permute(0, 3, 1, 2).float()\n"
+        "class Leaves(Model):\n"
+        "    def predict(self, batch):\n"
+        "        raise SystemExit(3)\n"
+    )
+    rows = [{"name": name, "model": f"{tmp_path}/bad.py:{name}"} for name in ("Peeks", "Leaves")]
+    record = run(rows, logs, tmp_path / "run")
+    counts = results.read_counts(results.result_folder(tmp_path / "run", record.rows[0].results[0]))[0]
+    assert counts[:, :, 1:].sum() == 0  # the target that it saw was empty, and so is its answer
+    assert counts.sum() > 10_000  # and its mask was not ours
+    assert "raised SystemExit: 3" in str(record.rows[1].failure)
+
+
+WITH_WEIGHTS = """
+from beside import WEIGHTS
+from semgrid_eval.models.model import Model, one_hot
+
+class Mine(Model):
+    def __init__(self, settings, given):
+        super().__init__(settings, given)
+        self.known = int(WEIGHTS.read_text())
+    def predict(self, batch):
+        batch.lead_s.zero_()
+        batch.shift_cells.zero_()
+        return one_hot(batch.past[:, 0, -1] * self.known)
+"""
+
+
+def test_a_model_with_other_weights_is_scored_again_and_cannot_move_what_others_see(logs, tmp_path):
+    (tmp_path / "beside.py").write_text(f"from pathlib import Path\nWEIGHTS = Path({str(tmp_path / 'weights')!r})\n")
+    (tmp_path / "mine.py").write_text(WITH_WEIGHTS)
+    rows = [{"name": "Mine", "model": f"{tmp_path}/mine.py:Mine"}, {"name": "BL", "model": "newest"}]
+    found = {}
+    for known in (1, 0):
+        (tmp_path / "weights").write_text(str(known))
+        record = run(rows, logs, tmp_path / "run")
+        assert [row.failure for row in record.rows] == [None, None]
+        for row in record.rows:
+            counts, _ = results.read_counts(results.result_folder(tmp_path / "run", row.results[0]))
+            found[row.name, known] = counts.tolist()
+    assert found["Mine", 1] == found["BL", 1] == found["BL", 0]
+    assert found["Mine", 0] != found["Mine", 1]
+
+
+def test_models_of_two_folders_do_not_share_what_lies_beside_them(logs, tmp_path):
+    rows = []
+    for known in (1, 0):
+        folder = tmp_path / f"version{known}"
+        folder.mkdir()
+        (folder / "weights").write_text(str(known))
+        (folder / "beside.py").write_text("from pathlib import Path\nWEIGHTS = Path(__file__).parent / 'weights'\n")
+        (folder / "mine.py").write_text(WITH_WEIGHTS)
+        rows.append({"name": f"Mine{known}", "model": f"{folder}/mine.py:Mine"})
+    first, second = (row.results[0] for row in run(rows, logs, tmp_path / "run").rows)
+    counts = [results.read_counts(results.result_folder(tmp_path / "run", name))[0] for name in (first, second)]
+    assert (counts[0] != counts[1]).any()
