@@ -28,7 +28,7 @@ from semgrid_eval.scores.evaluate import Evaluation, evaluate
 from semgrid_eval.windows.data import WindowSet, select_windows, window_arrays
 from semgrid_eval.windows.plan import WindowConfig, WindowPlan, training_windows, validation_windows
 
-SCORING_VERSION = 2
+SCORING_VERSION = 3
 """Counts changes to how windows are kept and scored; results of another version are made anew."""
 
 WindowPlanner = Callable[[Sequence[int], WindowConfig], WindowPlan]
@@ -112,7 +112,7 @@ class Worker:
         trained = self._train(job.training, row) if job.training else None
         predictor = _predictor(row, trained, job.counted, self.device)
         with self._stage(f"score {row.name}") as progress:
-            evaluation = evaluate(predictor, job.scored, mask_mode=row.mask_mode, progress=progress)
+            evaluation = evaluate(predictor, job.scored, mask_mode=row.mask_mode, spec=row.grid.spec, progress=progress)
         record = results.ResultRecord(
             format_version=results.FORMAT_VERSION,
             id=job.result_id,
@@ -308,7 +308,7 @@ def _keep_result(
     with_predictions: bool,
 ) -> None:
     with atomic_folder(folder) as partial:
-        results.write_counts(partial, evaluation.counts, evaluation.region_counts)
+        results.write_sums(partial, evaluation.sums)
         if with_predictions:
             arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
             write_arrays(partial / results.PREDICTIONS_FILE, arrays)

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from semgrid_eval.scores.calibration import certainty_counts, expected_calibration_error, reliability
 from sklearn.calibration import calibration_curve
 
 from semgrid_eval.classes import UNKNOWN
-from semgrid_eval.scores.calibration import certainty_counts, expected_calibration_error, reliability
 
 SHAPE = (2, 3, 4)
 GRIDS = arrays(np.uint8, SHAPE, elements=st.integers(0, 3))

@@ -2,9 +2,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sklearn.metrics import confusion_matrix, jaccard_score
-
-from semgrid_eval.classes import CATEGORY_NAMES, CLASS_COUNT, CLASS_NAMES, category_members
 from semgrid_eval.scores.iou import (
     averaged_members,
     category_iou,
@@ -13,6 +10,9 @@ from semgrid_eval.scores.iou import (
     mean_finite,
     merged_category_iou,
 )
+from sklearn.metrics import confusion_matrix, jaccard_score
+
+from semgrid_eval.classes import CATEGORY_NAMES, CLASS_COUNT, CLASS_NAMES, category_members
 
 
 def random_grids(seed, shape=(3, 7, 9), classes=CLASS_COUNT):

@@ -4,12 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.fake_run import FRAME_NS, FakeRow, make_fake_run
-
-from semgrid_eval.files import digest_value
-from semgrid_eval.report.estimates.bootstrap import score_rows
-from semgrid_eval.report.page.write import write_report
-from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables.pace import (
     PACES,
     mean_speed_mps,
@@ -19,6 +13,12 @@ from semgrid_eval.report.tables.pace import (
     score_paces,
 )
 from semgrid_eval.scores.iou import class_iou
+from support.fake_run import FRAME_NS, FakeRow, make_fake_run
+
+from semgrid_eval.files import digest_value
+from semgrid_eval.report.estimates.bootstrap import score_rows
+from semgrid_eval.report.page.write import write_report
+from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.thumbnails import Drive, LogPictures, pictures_file, write_pictures
 
 ROWS = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 2))

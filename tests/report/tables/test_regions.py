@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
-from support.fake_run import counted_row
-
 from semgrid_eval.report.tables.regions import region_frame, region_tables, score_regions
+from support.fake_run import counted_row
 
 
 def _rows():

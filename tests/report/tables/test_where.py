@@ -6,13 +6,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from support.fake_run import make_fake_run
-
-from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
-from semgrid_eval.errors import ResultError
-from semgrid_eval.grids.spec import GridConfig, GridSpec
-from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables import where
 from semgrid_eval.report.tables.where import (
     BANDS,
     ORIGINS,
@@ -23,6 +16,13 @@ from semgrid_eval.report.tables.where import (
     locate_rows,
 )
 from semgrid_eval.scores.iou import confusion
+from support.fake_run import make_fake_run
+
+from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
+from semgrid_eval.errors import ResultError
+from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.report.rows.load import load_runs
+from semgrid_eval.report.tables import where
 from semgrid_eval.scores.results import read_windows
 
 SHAPE = (2, 8, 8)
