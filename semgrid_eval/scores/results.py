@@ -17,6 +17,8 @@ RUN/pictures/<key>.npz         small camera and label images of the windows' fra
 """
 
 import re
+from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -254,21 +256,7 @@ def read_sums(folder: Path, metric: str, partition: str) -> NDArray[np.int32] | 
     Raises:
         ResultError: it is missing or malformed.
     """
-    path, name, shape = folder / SUMS_FILE, f"{metric}.{partition}", sums_shape(metric, partition)
-    everywhere = partition == "all"
-    found = read_arrays(path, (name,) if everywhere else (), optional=() if everywhere else (name,)).get(name)
-    if found is None:
-        return None
-    if found.shape[1:] != shape or found.dtype != np.int32:
-        raise ResultError(f"has shape {found.shape}, type {found.dtype}", path=path, field=name)
-    if found.min(initial=0) < 0:
-        raise ResultError("is negative", path=path, field=name)
-    return found
-
-
-def sums_shape(metric: str, partition: str) -> tuple[int, ...]:
-    """Return the shape of what a metric counts in one window by a partition: (regions, ...)."""
-    return (len(PARTITIONS[partition].regions), *METRICS[metric].shape)
+    return _read_sums(folder, [(metric, partition)]).get((metric, partition))
 
 
 def check_sums(folder: Path, windows: int) -> None:
@@ -277,12 +265,10 @@ def check_sums(folder: Path, windows: int) -> None:
     Raises:
         ResultError: it is missing, malformed or of another number of windows.
     """
-    for metric in METRICS:
-        for partition in PARTITIONS:
-            found = read_sums(folder, metric, partition)
-            if found is not None and len(found) != windows:
-                fault = f"has {len(found)} windows, and result.json {windows}"
-                raise ResultError(fault, path=folder / SUMS_FILE, field=f"{metric}.{partition}")
+    for key, found in _read_sums(folder, list(product(METRICS, PARTITIONS))).items():
+        if len(found) != windows:
+            fault = f"has {len(found)} windows, and result.json {windows}"
+            raise ResultError(fault, path=folder / SUMS_FILE, field=".".join(key))
 
 
 def read_counts(folder: Path) -> NDArray[np.int32]:
@@ -300,6 +286,24 @@ def read_history(folder: Path) -> pd.DataFrame | None:
     """Read the training history of a result, None where nothing was trained."""
     path = folder / HISTORY_FILE
     return pd.read_csv(path) if path.is_file() else None
+
+
+def _read_sums(folder: Path, keys: Sequence[tuple[str, str]]) -> dict[tuple[str, str], NDArray[np.int32]]:
+    path, names = folder / SUMS_FILE, {key: ".".join(key) for key in keys}
+    needed = tuple(name for key, name in names.items() if key[1] == "all")
+    found = read_arrays(path, needed, optional=tuple(name for name in names.values() if name not in needed))
+    for (metric, partition), name in names.items():
+        if name in found:
+            shape = (len(PARTITIONS[partition].regions), *METRICS[metric].shape)
+            _check_counted(found[name], shape, path, name)
+    return {key: found[name] for key, name in names.items() if name in found}
+
+
+def _check_counted(found: NDArray[Any], shape: tuple[int, ...], path: Path, name: str) -> None:
+    if found.shape[1:] != shape or found.dtype != np.int32:
+        raise ResultError(f"has shape {found.shape}, type {found.dtype}", path=path, field=name)
+    if found.min(initial=0) < 0:
+        raise ResultError("is negative", path=path, field=name)
 
 
 def _check_version(found: int, path: Path) -> None:

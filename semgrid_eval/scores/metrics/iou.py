@@ -45,9 +45,14 @@ class Iou:
 
     def ratios(self, sums: Counts) -> Counts:
         """Cells that both grids have in a class or merged category, and that either has: (..., C, C) -> (..., K, 2)."""
-        flat = sums.reshape(-1, CLASS_COUNT**2).astype(np.float64)  # BLAS knows floats only; exact below 2**53
-        terms = np.rint(flat @ self._terms).astype(np.int64)
-        return terms.reshape(*sums.shape[:-2], len(self.ratio_names), 2)
+        target, predicted = sums.sum(axis=-1), sums.sum(axis=-2)
+        members = averaged_members()
+        groups = [(i,) for i in range(CLASS_COUNT)] + [members[name.removeprefix("merged_")] for name in MERGED_COLUMNS]
+        both = np.stack([_between(sums, ids) for ids in groups], axis=-1)
+        each = np.stack(
+            [target[..., list(ids)].sum(axis=-1) + predicted[..., list(ids)].sum(axis=-1) for ids in groups], axis=-1
+        )
+        return np.stack([both, each - both], axis=-1)
 
     def figures(self, ratios: Counts) -> Floats:
         """Divide, and take the means over the classes of each category that are there."""
@@ -67,14 +72,10 @@ class Iou:
         table |= {name: (i,) for i, name in enumerate(CLASS_NAMES)}
         return np.array([[i in table[column.name] for i in range(CLASS_COUNT)] for column in self.columns], np.int64)
 
-    @cached_property
-    def _terms(self) -> Floats:
-        """The matrix (C * C, K * 2) that takes counts to numerators and denominators."""
-        names = [column.name for column in self.columns]
-        inside = self._membership[[names.index(name) for name in self.ratio_names]] > 0
-        both, either = inside[:, :, None] & inside[:, None, :], inside[:, :, None] | inside[:, None, :]
-        terms = np.stack([both, either], axis=1)  # (K, 2, C, C)
-        return np.asarray(terms.reshape(-1, CLASS_COUNT**2).T, np.float64)
+
+def _between(sums: Counts, ids: tuple[int, ...]) -> Counts:
+    """Count the cells of some classes that are predicted to be of one of them: (..., C, C) -> (...)."""
+    return np.asarray(sum(sums[..., i, j] for i in ids for j in ids))
 
 
 def confusion(target: NDArray[np.uint8], prediction: NDArray[np.uint8], mask: NDArray[np.bool_]) -> Counts:

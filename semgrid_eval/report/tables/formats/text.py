@@ -11,10 +11,17 @@ def one_line(text: str) -> str:
 
 
 def heads(table: Table) -> list[str]:
-    """Return the headers of all columns, the second lines behind the first ones only where these repeat."""
+    """Return the headers of all columns, with the region of each where there are several."""
     labels = [label for label, _ in table.columns]
     several = len(set(labels)) < len(labels)
-    return [table.corner, *(f"{label} ({note})" if several and note else label for label, note in table.columns)]
+    parts = [note.rpartition(", ")[0] for _, note in table.columns]
+    return [
+        table.corner,
+        *(
+            f"{label} ({part})" if several and part else label
+            for (label, _), part in zip(table.columns, parts, strict=True)
+        ),
+    ]
 
 
 def lines(table: Table) -> Iterator[tuple[str, tuple[Cell, ...]]]:
