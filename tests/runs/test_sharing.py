@@ -107,7 +107,7 @@ def test_a_model_with_other_weights_is_scored_anew_and_cannot_move_what_others_s
         record = work(rows)
         assert failures(record) == {"Mine": None, "BL": None}
         for row in record.rows:
-            counts, _ = results.read_counts(results.result_folder(work.out, row.results[0]))
+            counts = results.read_counts(results.result_folder(work.out, row.results[0]))
             found[row.name, known] = counts.tolist()
     assert found["Mine", 1] == found["BL", 1] == found["BL", 0]
     assert found["Mine", 0] != found["Mine", 1]
@@ -123,7 +123,7 @@ def test_models_of_two_folders_do_not_share_what_lies_beside_them(work, tmp_path
         (folder / "mine.py").write_text(MODEL)
         rows.append({"name": f"Mine{known}", "model": f"{folder}/mine.py:Mine"})
     first, second = (row.results[0] for row in work(rows).rows)
-    counts = [results.read_counts(results.result_folder(work.out, name))[0] for name in (first, second)]
+    counts = [results.read_counts(results.result_folder(work.out, name)) for name in (first, second)]
     assert (counts[0] != counts[1]).any()
 
 

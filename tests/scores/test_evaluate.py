@@ -1,14 +1,19 @@
 """Scoring a predictor: counts of all cells and of those near actors, against a loop over cells."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 from support.recordings import random_recording
 
-from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
 from semgrid_eval.errors import InputError
+from semgrid_eval.grids.spec import GridSpec
 from semgrid_eval.models.baselines import RepeatNewest
 from semgrid_eval.scores.evaluate import evaluate
+from semgrid_eval.scores.metrics.table import METRICS
+from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.windows.data import select_windows, stack_recordings, window_arrays
 from semgrid_eval.windows.plan import WindowConfig, validation_windows
 
@@ -34,8 +39,9 @@ def test_regions_equal_counting_cell_by_cell(batch):
     windows = windows_of(*(random_recording(seed, truth=seed != 2) for seed in range(5)))
     scored = evaluate(RepeatNewest(), windows, batch=batch)
     kept = window_arrays(windows)
-    np.testing.assert_array_equal(scored.counts, slow_counts(kept, scored.prediction, lambda flags: True))
-    moving, standing = scored.region_counts["moving"], scored.region_counts["standing"]
+    everywhere = slow_counts(kept, scored.prediction, lambda flags: True)
+    np.testing.assert_array_equal(scored.sums["iou", "all"][:, 0], everywhere)
+    moving, standing = np.moveaxis(scored.sums["iou", "actors"], 1, 0)
     np.testing.assert_array_equal(moving, slow_counts(kept, scored.prediction, lambda flags: flags in (2, 3)))
     np.testing.assert_array_equal(standing, slow_counts(kept, scored.prediction, lambda flags: flags == 1))
     assert [bool(counts.sum()) for counts in moving] == [True, True, False, True, True]  # number 2 has no truth
@@ -51,8 +57,36 @@ def test_class_and_certainty_are_those_of_the_largest_score_in_each_cell():
         assert scored.certainty[n, row, column] == round(min(max(cell), 1.0) * 255)
 
 
-def test_without_the_truth_there_are_no_regions():
-    assert evaluate(RepeatNewest(), windows_of(random_recording(0))).region_counts == {}
+def test_without_the_truth_nothing_is_known_of_actors():
+    sums = evaluate(RepeatNewest(), windows_of(random_recording(0))).sums
+    assert not any(partition == "actors" for _, partition in sums)
+    assert set(sums) == {(m, p) for m in METRICS for p in PARTITIONS if p != "actors"}
+
+
+def test_inputs_that_are_not_translated_are_moved_into_the_targets_place_for_scores():
+    windows = windows_of(random_recording(0), random_recording(1))
+    kept = window_arrays(windows)
+    scored = evaluate(RepeatNewest(), replace(windows, translate=False))
+    seen = (kept["inputs"][:, :, -1] != UNKNOWN).any(axis=1) & ~kept["mask"]
+    assert scored.sums["iou", "origin"][:, 0].sum() == seen.sum()
+
+
+def test_distances_are_those_of_the_grid_that_is_told():
+    windows = windows_of(random_recording(0))
+    rows, columns = windows.data.grids.shape[-2:]
+    near = evaluate(RepeatNewest(), windows).sums["iou", "distance"]
+    spec = GridSpec(rows=rows, columns=columns, cell_m=10.0, agent_row=rows, agent_column=columns // 2)
+    far = evaluate(RepeatNewest(), windows, spec=spec).sums["iou", "distance"]
+    assert near[:, 3].sum() == 0  # cells of half a metre
+    assert far[:, 3].sum() > 0
+
+
+@pytest.mark.parametrize(("mode", "count"), [("exclude", 0), ("substitute", 1), ("off", 1)])
+def test_cells_of_the_mask_count_as_asked(mode, count):
+    windows = windows_of(random_recording(0))
+    kept = window_arrays(windows)
+    counts = evaluate(RepeatNewest(), windows, mask_mode=mode).sums["iou", "all"]
+    assert counts.sum() == (~kept["mask"]).sum() + count * kept["mask"].sum()
 
 
 def test_no_window_is_an_error():

@@ -6,11 +6,12 @@ import numpy as np
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.estimates.bootstrap import CATEGORY_COLUMNS, LABELS, MERGED_COLUMNS, RowScores, Scores
+from semgrid_eval.report.rows.load import Result
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS
 from semgrid_eval.report.tables.changes import changes_table
 from semgrid_eval.report.tables.table import ABSENT, Cell, Line, Table, plain_cell, plural
 from semgrid_eval.report.tables.values import difference_table, run_differences, seeds, value_table
-from semgrid_eval.scores.metrics.metric import divided
+from semgrid_eval.scores.metrics.metric import Floats, Metric, divided
 
 _PAPER = (
     "The paper's values (Table A1) come from Cityscapes' validation set; "
@@ -53,11 +54,21 @@ def _window_cells(entry: RowScores) -> tuple[Cell, ...]:
     at = [list(LABELS).index(column) for column in CATEGORY_COLUMNS]
     total, number = np.zeros((2, len(at)))
     for result in entry.results:
-        values = entry.metric.figures(entry.metric.ratios(result.counts.astype(np.int64)))[:, at]
+        values = _window_figures(entry.metric, result)[:, at]
         total, number = total + np.nansum(values, axis=0), number + np.isfinite(values).sum(axis=0)
     texts = [f"{entry.row.name}: {plural(int(n), 'window score')}, all seeds together; {seeds(entry)}" for n in number]
     means = divided(total, number.astype(np.int64)).tolist()
     return tuple(plain_cell(mean, title=text) for mean, text in zip(means, texts, strict=True))
+
+
+def _window_figures(metric: Metric, result: Result) -> Floats:
+    """Return the figures (N, Q) of each window alone, without keeping what they come from."""
+    counts = result.read(metric.name, "all")
+    return (
+        np.zeros((0, len(metric.columns)))
+        if counts is None
+        else metric.figures(metric.ratios(counts[:, 0].astype(np.int64)))
+    )
 
 
 def confusion_table(entry: RowScores, name: str) -> Table:

@@ -22,8 +22,8 @@ def _configured(run, repeats, windows, **config):
     rows = []
     for row in run.rows:
         first = row.results[0]
-        record = first.record.model_copy(update={"config": config})
-        results = (replace(first, record=record, counts=first.counts[:1].repeat(windows, axis=0)),) * repeats
+        record = first.record.model_copy(update={"config": config, "windows": first.record.windows[:1] * windows})
+        results = (replace(first, record=record),) * repeats
         rows.append(replace(row, results=results))
     return replace(run, rows=tuple(rows))
 
