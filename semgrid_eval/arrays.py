@@ -51,13 +51,17 @@ def read_arrays(path: Path, names: tuple[str, ...], *, optional: tuple[str, ...]
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > _ARRAY_LIMIT_BYTES:
-            raise ResultError(f"would need {size >> 20} MiB", path=path)
-        with np.load(path, allow_pickle=False) as arrays:
+            sizes = {entry.filename.removesuffix(".npy"): entry.file_size for entry in archive.infolist()}
+            if (size := sum(sizes.values())) > _ARRAY_LIMIT_BYTES:
+                raise ResultError(f"would need {size >> 20} MiB", path=path)
             for name in names:
-                if name not in arrays:
+                if name not in sizes:
                     raise ResultError(f"has no array {name}", path=path)
-            return {name: arrays[name] for name in (*names, *optional) if name in arrays}
+            return {name: _array(archive, name) for name in (*names, *optional) if name in sizes}
     except _DAMAGE as error:
         raise ResultError(f"cannot be read: {error}", path=path) from error
+
+
+def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    with archive.open(f"{name}.npy") as stream:
+        return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))

@@ -1,6 +1,7 @@
 """`semgrid-eval report`: the page, tables and figures of a run."""
 
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -10,7 +11,14 @@ from semgrid_eval.cli.console import progress
 @click.command("report", epilog="Example: semgrid-eval report runs/first")
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to write; `report` in the first run by default.")
-def command(runs: tuple[Path, ...], out: Path | None) -> None:
+@click.option(
+    "--resample",
+    type=click.Choice(["recordings", "groups"]),
+    default="recordings",
+    show_default=True,
+    help="What intervals resample first: recordings, or the towns, cities or drives that they belong to.",
+)
+def command(runs: tuple[Path, ...], out: Path | None, resample: Literal["recordings", "groups"]) -> None:
     """Write one self-contained HTML page, CSV tables and figures from what RUN left on disk.
 
     Prints the path of the page. Several runs are shown side by side, with their differences.
@@ -18,5 +26,5 @@ def command(runs: tuple[Path, ...], out: Path | None) -> None:
     from semgrid_eval.report.page.write import write_report  # here, so that `--help` does not wait for matplotlib
 
     with progress("reading results") as shown:
-        page = write_report(runs, out, progress=shown)
+        page = write_report(runs, out, resample=resample, progress=shown)
     click.echo(page)

@@ -18,7 +18,7 @@ from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
 
-SCORING_VERSION = 2
+SCORING_VERSION = 3
 """Counts changes to how windows are kept and scored; results of another version are made again."""
 
 

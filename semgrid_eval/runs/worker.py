@@ -114,7 +114,7 @@ class Worker:
         with seeded(seed or 0, self.device):
             model, train_seconds = self._fitted(job)
             with self.stage(f"score {row.name}") as progress:
-                evaluation = evaluate(model, job.scored, mask_mode=row.mask_mode, progress=progress)
+                evaluation = evaluate(model, job.scored, mask_mode=row.mask_mode, spec=row.grid.spec, progress=progress)
         record = self._result_record(job, model, train_seconds, evaluation.seconds)
         folder = results.result_folder(self._place.out, job.result_id)
         _keep_result(folder, record, evaluation, self._history(job), with_predictions=self._shows(seed))
@@ -231,7 +231,7 @@ def _keep_result(
     with_predictions: bool,
 ) -> None:
     with atomic_folder(folder) as partial:
-        results.write_counts(partial, evaluation.counts, evaluation.region_counts)
+        results.write_sums(partial, evaluation.sums)
         if with_predictions:
             arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
             write_arrays(partial / results.PREDICTIONS_FILE, arrays)

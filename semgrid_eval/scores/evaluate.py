@@ -1,4 +1,4 @@
-"""Predict once: run a predictor over all windows and keep counts, classes and certainty."""
+"""Predict once: run a model over all windows and keep what metrics counted, classes and certainty."""
 
 import time
 from dataclasses import dataclass, replace
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.errors import InputError
-from semgrid_eval.grids.spec import MOVING, STANDING
+from semgrid_eval.grids.spec import GridSpec
 from semgrid_eval.models.model import Model
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.scores.iou import Counts, confusion
+from semgrid_eval.scores.metrics.metric import ScoredWindows
+from semgrid_eval.scores.metrics.table import Sums, count_windows
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 MaskMode = Literal["exclude", "substitute", "off"]
@@ -21,18 +22,16 @@ MaskMode = Literal["exclude", "substitute", "off"]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What is left of a predictor's answers.
+    """What is left of a model's answers.
 
     Args:
-        counts: (N, C, C) cells by target and predicted class, mask M treated as asked.
-        region_counts: the same of cells near `moving` and near `standing` actors alone; empty without the truth.
+        sums: what every metric counted, (N, regions, ...), by the names of metric and partition.
         prediction: (N, H, W) uint8 class ids.
         certainty: (N, H, W) uint8, the highest score of each cell, 255 = 1.
         seconds: time spent predicting, without gathering inputs.
     """
 
-    counts: Counts
-    region_counts: dict[str, Counts]
+    sums: Sums
     prediction: NDArray[np.uint8]
     certainty: NDArray[np.uint8]
     seconds: float
@@ -43,47 +42,78 @@ def evaluate(
     windows: WindowSet,
     *,
     mask_mode: MaskMode = "exclude",
+    spec: GridSpec | None = None,
     batch: int = 16,
     progress: Progress = silent,
 ) -> Evaluation:
-    """Score a predictor over all windows, in order.
+    """Score a model over all windows, in order, by every metric.
+
+    Args:
+        model: sees the past of a batch and its motion alone.
+        windows: the windows to score.
+        mask_mode: how the cells of M are treated.
+        spec: extent of the grids; by default the vehicle is at the middle of the bottom edge.
+        batch: windows at once.
+        progress: told of each batch.
 
     Raises:
         InputError: there is no window, or the predictor's answer is malformed.
     """
     if not len(windows):
         raise InputError("there is no window to score")
-    counts, predictions, certainties = [], [], []
-    region_counts: dict[str, list[Counts]] = {}
-    seconds = 0.0
+    spec = spec or _usual_spec(windows)
+    parts = []
     if windows.target_frames.is_cuda:  # the first call loads kernels
         with torch.inference_mode():
             model.predict(_without_answer(windows.batch(slice(batch))))
     for start in range(0, len(windows), batch):
         chosen = slice(start, start + batch)
-        part = windows.batch(chosen)
-        if part.target.is_cuda:  # what is still being gathered there is not the predictor's time
-            torch.cuda.synchronize(part.target.device)
-        start_s = time.perf_counter()
-        with torch.inference_mode():
-            certainty, prediction = model.predict(_without_answer(part)).max(dim=1)
-            answer = prediction.to(torch.uint8).cpu().numpy()
-        seconds += time.perf_counter() - start_s
-        predictions.append(answer)
-        certainties.append((certainty.float().clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy())
-        target, mask = part.target.cpu().numpy(), part.mask.cpu().numpy()
-        scored, left_out = apply_mask(answer, mask, mask_mode)
-        counts.append(confusion(target, scored, left_out))
-        for name, region in actor_regions(windows.actors(chosen)).items():
-            region_counts.setdefault(name, []).append(confusion(target, scored, left_out | ~region))
-        progress(sum(map(len, predictions)), len(windows))
+        seen = windows.batch(chosen)
+        answer = _predict(model, seen)
+        scored = _scored(windows, chosen, seen, answer, mask_mode, spec)
+        parts.append(replace(answer, sums=count_windows(scored)))
+        progress(min(start + batch, len(windows)), len(windows))
     return Evaluation(
-        np.concatenate(counts),
-        {name: np.concatenate(parts) for name, parts in region_counts.items()},
-        np.concatenate(predictions),
-        np.concatenate(certainties),
-        seconds,
+        {key: np.concatenate([part.sums[key] for part in parts]) for key in parts[0].sums},
+        np.concatenate([part.prediction for part in parts]),
+        np.concatenate([part.certainty for part in parts]),
+        sum(part.seconds for part in parts),
     )
+
+
+def _predict(model: Model, seen: WindowBatch) -> Evaluation:
+    if seen.target.is_cuda:  # what is still being gathered there is not the predictor's time
+        torch.cuda.synchronize(seen.target.device)
+    start_s = time.perf_counter()
+    with torch.inference_mode():
+        certainty, prediction = model.predict(_without_answer(seen)).max(dim=1)
+        answer = prediction.to(torch.uint8).cpu().numpy()
+    seconds = time.perf_counter() - start_s
+    levels = (certainty.float().clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy()
+    return Evaluation({}, answer, levels, seconds)
+
+
+def _scored(
+    windows: WindowSet, chosen: slice, seen: WindowBatch, answer: Evaluation, mask_mode: MaskMode, spec: GridSpec
+) -> ScoredWindows:
+    """Gather what metrics see of the chosen windows."""
+    aligned = seen if windows.translate else replace(windows, translate=True).batch(chosen)
+    prediction, left_out = apply_mask(answer.prediction, seen.mask.cpu().numpy(), mask_mode)
+    return ScoredWindows(
+        target=seen.target.cpu().numpy(),
+        prediction=prediction,
+        certainty=answer.certainty,
+        left_out=left_out,
+        inputs=aligned.past.cpu().numpy(),
+        actors=windows.actors(chosen),
+        spec=spec,
+    )
+
+
+def _usual_spec(windows: WindowSet) -> GridSpec:
+    rows, columns = windows.data.grids.shape[-2:]
+    cell_m = windows.data.cell_m
+    return GridSpec(rows=rows, columns=columns, cell_m=cell_m, agent_row=rows, agent_column=columns // 2)
 
 
 def _without_answer(batch: WindowBatch) -> WindowBatch:
@@ -108,11 +138,3 @@ def apply_mask(
         return prediction, mask
     scored = np.where(mask, np.uint8(UNKNOWN), prediction) if mode == "substitute" else prediction
     return scored, np.zeros_like(mask)
-
-
-def actor_regions(actors: NDArray[np.uint8] | None) -> dict[str, NDArray[np.bool_]]:
-    """Split flags (N, H, W) into the cells near moving and near standing actors; cells near both are moving."""
-    if actors is None:
-        return {}
-    moving = (actors & MOVING) != 0
-    return {"moving": moving, "standing": ((actors & STANDING) != 0) & ~moving}

@@ -3,20 +3,22 @@
 ```
 RUN/run.json                   RunRecord: provenance, logs, rows and, for each row, its results by id
 RUN/results/<id>/result.json   ResultRecord
-RUN/results/<id>/counts.npz    counts (N, C, C) int64, [target, prediction], mask M left out; where a log has the truth
-                               counts_moving and counts_standing alike: cells near moving actors, or near standing
-                               ones alone. Near is within a cell of the footprint at the target's time, or of the
-                               footprint in an input, moved by the ego motion, where a repeated input has its ghost
+RUN/results/<id>/sums.npz      int32 arrays METRIC.PARTITION (N, regions, ...): what each metric of `scores.metrics`
+                               counted in each window, by the regions of a partition of `scores.regions`; `iou.all` is
+                               the confusion matrix (N, 1, C, C), [target, prediction], mask M left out. The partition
+                               `actors` is there where a log has the truth
 RUN/results/<id>/history.csv   of trained models: epoch, updates, learning_rate, loss, validation_loss, seconds
 RUN/results/<id>/predictions.npz   prediction (N, H, W) uint8 class ids, certainty (N, H, W) uint8 (255 = 1.0)
 RUN/windows/<id>.npz           inputs (N, S, T, H, W) uint8 aligned, target (N, H, W) uint8, mask (N, H, W) bool;
                                where a log has the truth actors (N, H, W) uint8: 1 near a standing actor, 2 near a
                                moving one, 3 near both, zeros for windows of logs without the truth
-RUN/pictures/<key>.npz         small camera and label images of the windows' frames, see `scores.pictures`
+RUN/pictures/<key>.npz         small camera and label images of the windows' frames, see `scores.thumbnails`
 ```
 """
 
 import re
+from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,22 +27,25 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from semgrid_eval.arrays import read_arrays, write_arrays
-from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import read_json, write_json
+from semgrid_eval.scores.metrics.table import METRICS, Sums
+from semgrid_eval.scores.regions.table import PARTITIONS
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+SUMS_FILE = "sums.npz"
 PREDICTIONS_FILE = "predictions.npz"
 HISTORY_FILE = "history.csv"
 NOT_RUN = "not run yet"
 """What the record of a row says whose turn has not come."""
-REGIONS = ("moving", "standing")
-"""Where counts are kept apart: near actors that move, and near those that stand."""
 
 
 class LogRecord(Config):
-    """A log that took part in a run; its path is below the folder of logs."""
+    """A log that took part in a run; its path is below the folder of logs.
+
+    Its group is the town, city or drive that it belongs to; empty where it stands for itself.
+    """
 
     name: str
     path: str
@@ -48,7 +53,7 @@ class LogRecord(Config):
     split: str
     dataset: str
     group: str = ""
-    fingerprint: str | None = None  # of a benchmark's log: what it is held against the published ones by
+    fingerprint: str | None = None  # of a benchmark's log: what is compared with the published ones
 
 
 class WindowRecord(Config):
@@ -212,14 +217,12 @@ def write_result(folder: Path, record: ResultRecord) -> None:
 
 
 def is_done(folder: Path, *, with_predictions: bool = False, with_history: bool = False) -> bool:
-    """Tell whether a result parses, matches its id, has counts of the right shape, and what else is asked for."""
+    """Tell whether a result parses, matches its id, has sums of every metric, and what else is asked for."""
     try:
-        counts, _ = read_counts(folder)
+        check_sums(folder, len(read_result(folder).windows))
         if with_predictions:
             read_predictions(folder)
-        if with_history and ((history := read_history(folder)) is None or history.empty):
-            return False
-        return len(counts) == len(read_result(folder).windows)
+        return not with_history or ((history := read_history(folder)) is not None and not history.empty)
     except (InputError, OSError, ValueError):
         return False
 
@@ -242,29 +245,41 @@ def read_predictions(folder: Path) -> dict[str, NDArray[Any]]:
     return read_arrays(folder / PREDICTIONS_FILE, ("prediction", "certainty"))
 
 
-def write_counts(folder: Path, counts: NDArray[np.int64], region_counts: dict[str, NDArray[np.int64]]) -> None:
-    """Write the confusion counts (N, C, C) of a result, and those of regions by their names in `REGIONS`."""
-    regions = {f"counts_{name}": region_counts[name] for name in REGIONS if name in region_counts}
-    write_arrays(folder / "counts.npz", {"counts": counts, **regions})
+def write_sums(folder: Path, sums: Sums) -> None:
+    """Write what every metric counted in a result's windows."""
+    write_arrays(folder / SUMS_FILE, {".".join(key): array for key, array in sums.items()})
 
 
-def read_counts(folder: Path) -> tuple[NDArray[np.int64], dict[str, NDArray[np.int64]]]:
-    """Read the confusion counts (N, C, C) of a result: of all cells, and near `moving` and `standing` actors.
+def read_sums(folder: Path, metric: str, partition: str) -> NDArray[np.int32] | None:
+    """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions.
 
-    The latter are empty where no log had the truth.
+    Raises:
+        ResultError: it is missing or malformed.
+    """
+    return _read_sums(folder, [(metric, partition)]).get((metric, partition))
+
+
+def check_sums(folder: Path, windows: int) -> None:
+    """Read everything that was counted, and forget it.
+
+    Raises:
+        ResultError: it is missing, malformed or of another number of windows.
+    """
+    for key, found in _read_sums(folder, list(product(METRICS, PARTITIONS))).items():
+        if len(found) != windows:
+            fault = f"has {len(found)} windows, and result.json {windows}"
+            raise ResultError(fault, path=folder / SUMS_FILE, field=".".join(key))
+
+
+def read_counts(folder: Path) -> NDArray[np.int32]:
+    """Read the confusion counts of all cells of a result: (N, C, C).
 
     Raises:
         ResultError: they are missing or malformed.
     """
-    path = folder / "counts.npz"
-    keys = {name: f"counts_{name}" for name in REGIONS}
-    found = read_arrays(path, ("counts",), optional=tuple(keys.values()))
-    counts = _checked_counts(found["counts"], path, "counts")
-    regions = {name: _checked_counts(found[key], path, key) for name, key in keys.items() if key in found}
-    for name, near in regions.items():
-        if len(near) != len(counts):
-            raise ResultError(f"has {len(near)} windows, not {len(counts)}", path=path, field=keys[name])
-    return counts, regions
+    counts = read_sums(folder, "iou", "all")
+    assert counts is not None  # all cells are always counted
+    return counts[:, 0]
 
 
 def read_history(folder: Path) -> pd.DataFrame | None:
@@ -273,10 +288,22 @@ def read_history(folder: Path) -> pd.DataFrame | None:
     return pd.read_csv(path) if path.is_file() else None
 
 
-def _checked_counts(counts: NDArray[Any], path: Path, name: str) -> NDArray[np.int64]:
-    if counts.ndim != 3 or counts.shape[1:] != (CLASS_COUNT, CLASS_COUNT) or counts.dtype != np.int64:
-        raise ResultError(f"has shape {counts.shape}, type {counts.dtype}", path=path, field=name)
-    return counts
+def _read_sums(folder: Path, keys: Sequence[tuple[str, str]]) -> dict[tuple[str, str], NDArray[np.int32]]:
+    path, names = folder / SUMS_FILE, {key: ".".join(key) for key in keys}
+    needed = tuple(name for key, name in names.items() if key[1] == "all")
+    found = read_arrays(path, needed, optional=tuple(name for name in names.values() if name not in needed))
+    for (metric, partition), name in names.items():
+        if name in found:
+            shape = (len(PARTITIONS[partition].regions), *METRICS[metric].shape)
+            _check_counted(found[name], shape, path, name)
+    return {key: found[name] for key, name in names.items() if name in found}
+
+
+def _check_counted(found: NDArray[Any], shape: tuple[int, ...], path: Path, name: str) -> None:
+    if found.shape[1:] != shape or found.dtype != np.int32:
+        raise ResultError(f"has shape {found.shape}, type {found.dtype}", path=path, field=name)
+    if found.min(initial=0) < 0:
+        raise ResultError("is negative", path=path, field=name)
 
 
 def _check_version(found: int, path: Path) -> None:

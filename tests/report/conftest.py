@@ -52,7 +52,7 @@ def troubled(tmp_path_factory) -> Path:
         row.model_copy(update={"name": name, "label": name, "experiment": f"{i} {name}", "sensors": (name,)})
         for i, (row, name) in enumerate(zip(record.rows, HOSTILE, strict=False))
     )
-    (result_folder(run, record.rows[4].results[0]) / "counts.npz").write_bytes(b"not a zip")
+    (result_folder(run, record.rows[4].results[0]) / "sums.npz").write_bytes(b"not a zip")
     rows, broken = (*hostile, *record.rows[4:]), {name: name for name in HOSTILE}
     write_run(run, record.model_copy(update={"title": " ".join(HOSTILE), "rows": rows, "failed_logs": broken}))
     return write_report(run, tmp_path_factory.mktemp("reports") / "troubled")

@@ -4,13 +4,13 @@ import importlib.metadata
 
 import pytest
 import torch
+from semgrid_eval.scores.iou import category_iou, class_iou
 from support.small_runs import run, write_logs
 
 from semgrid_eval.executors import Processes
 from semgrid_eval.models.own import ENTRY_POINT_GROUP
 from semgrid_eval.runs import worker
 from semgrid_eval.scores import results
-from semgrid_eval.scores.iou import category_iou, class_iou
 
 NETWORK = """
 import torch
@@ -65,7 +65,7 @@ def result_of(out, row):
 def score(out, record, name):
     row = next(row for row in record.rows if row.name == name)
     result_of(out, row)
-    counts = results.read_counts(results.result_folder(out, row.results[0]))[0]
+    counts = results.read_counts(results.result_folder(out, row.results[0]))
     return float(category_iou(class_iou(counts.sum(axis=0)))["mean_known"])
 
 
@@ -279,7 +279,7 @@ def test_a_model_that_cheats_or_leaves_is_stopped(logs, tmp_path):
     )
     rows = [{"name": name, "model": f"{tmp_path}/bad.py:{name}"} for name in ("Peeks", "Leaves")]
     record = run(rows, logs, tmp_path / "run")
-    counts = results.read_counts(results.result_folder(tmp_path / "run", record.rows[0].results[0]))[0]
+    counts = results.read_counts(results.result_folder(tmp_path / "run", record.rows[0].results[0]))
     assert counts[:, :, 1:].sum() == 0  # the target that it saw was empty, and so is its answer
     assert counts.sum() > 10_000  # and its mask was not ours
     assert "raised SystemExit: 3" in str(record.rows[1].failure)
@@ -310,7 +310,7 @@ def test_a_model_with_other_weights_is_scored_again_and_cannot_move_what_others_
         record = run(rows, logs, tmp_path / "run")
         assert [row.failure for row in record.rows] == [None, None]
         for row in record.rows:
-            counts, _ = results.read_counts(results.result_folder(tmp_path / "run", row.results[0]))
+            counts = results.read_counts(results.result_folder(tmp_path / "run", row.results[0]))
             found[row.name, known] = counts.tolist()
     assert found["Mine", 1] == found["BL", 1] == found["BL", 0]
     assert found["Mine", 0] != found["Mine", 1]
@@ -326,5 +326,5 @@ def test_models_of_two_folders_do_not_share_what_lies_beside_them(logs, tmp_path
         (folder / "mine.py").write_text(WITH_WEIGHTS)
         rows.append({"name": f"Mine{known}", "model": f"{folder}/mine.py:Mine"})
     first, second = (row.results[0] for row in run(rows, logs, tmp_path / "run").rows)
-    counts = [results.read_counts(results.result_folder(tmp_path / "run", name))[0] for name in (first, second)]
+    counts = [results.read_counts(results.result_folder(tmp_path / "run", name)) for name in (first, second)]
     assert (counts[0] != counts[1]).any()

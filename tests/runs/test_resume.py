@@ -23,8 +23,8 @@ rows:
 def outputs(out):
     """Everything that numbers come from, by name; durations are no such thing."""
     report = write_report(out).parent
-    files = [report / "classes.csv", report / "categories.csv"]
-    files += [*out.glob("results/*/counts.npz"), *out.glob("results/*/predictions.npz"), *out.glob("windows/*.npz")]
+    files = [report / "scores.csv"]
+    files += [*out.glob("results/*/sums.npz"), *out.glob("results/*/predictions.npz"), *out.glob("windows/*.npz")]
     files += [*out.glob("trainings/*/weights.safetensors")]
     return {str(path.relative_to(out)): path.read_bytes() for path in files}
 

@@ -14,7 +14,7 @@ from semgrid_eval.executors import Processes
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.types import Actor, Pose
 from semgrid_eval.scores import results
-from semgrid_eval.scores.iou import category_iou, class_iou
+from semgrid_eval.scores.metrics.iou import category_iou, class_iou
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def logs(tmp_path_factory):
 def score(out, record, name):
     row = next(row for row in record.rows if row.name == name)
     assert row.failure is None, row.failure
-    counts = results.read_counts(results.result_folder(out, row.results[0]))[0]
+    counts = results.read_counts(results.result_folder(out, row.results[0]))
     return float(category_iou(class_iou(counts.sum(axis=0)))["mean_known"])
 
 
@@ -64,7 +64,7 @@ def test_a_run_leaves_results_that_parse_and_belong_together(logs, tmp_path):
         windows = results.read_windows(out, result.windows_id)
         assert windows["inputs"].shape == (2, len(row.sensors), 2, 128, 128)
         predictions = results.read_predictions(folder)
-        counts = results.read_counts(folder)[0]
+        counts = results.read_counts(folder)
         for n in range(2):
             scored = ~windows["mask"][n]
             for class_id in range(len(CLASS_NAMES)):
@@ -150,15 +150,13 @@ def test_truth_in_the_logs_gives_scores_near_moving_and_standing_actors(tmp_path
         write_log(with_truth(recording, known), tmp_path / "logs" / f"toy{number}.mcap")
     record = run([{"name": "BL-DC", "model": "newest"}], tmp_path / "logs", tmp_path / "run")
     folder = results.result_folder(tmp_path / "run", record.rows[0].results[0])
-    regions = results.read_counts(folder)[1]
-    assert {name: (counts.sum(axis=(1, 2)) > 0).tolist() for name, counts in regions.items()} == {
-        "moving": [True, False],
-        "standing": [True, False],
-    }
+    moving, standing = np.moveaxis(results.read_sums(folder, "iou", "actors"), 1, 0)
+    for counts in (moving, standing):
+        assert (counts.sum(axis=(1, 2)) > 0).tolist() == [True, False]
     windows_id = results.read_result(folder).windows_id
     kept = results.read_arrays(results.windows_file(tmp_path / "run", windows_id), ("actors", "mask"))
     near = (kept["actors"] == 1) & ~kept["mask"]
-    assert regions["standing"].sum() == near.sum()
+    assert standing.sum() == near.sum()
 
 
 def with_truth(recording, known):
@@ -200,7 +198,7 @@ def test_several_processes_give_the_same_bytes_as_one(logs, tmp_path):
 def test_mask_modes_differ_in_the_row_of_unknown_only(logs, tmp_path, mode):
     record = run([{"name": "BL-DC", "model": "newest", "mask_mode": mode}], logs, tmp_path / "run")
     folder = results.result_folder(tmp_path / "run", record.rows[0].results[0])
-    counts = results.read_counts(folder)[0]
+    counts = results.read_counts(folder)
     windows_id = results.read_result(folder).windows_id
     windows = results.read_arrays(results.windows_file(tmp_path / "run", windows_id), ("mask", "target"))
     prediction = results.read_arrays(folder / "predictions.npz", ("prediction",))["prediction"]

@@ -37,8 +37,9 @@ def test_regions_equal_counting_cell_by_cell(batch):
     windows = windows_of(*(random_recording(seed, truth=seed != 2) for seed in range(5)))
     scored = evaluate(made(RepeatNewest), windows, batch=batch)
     kept = window_arrays(windows)
-    np.testing.assert_array_equal(scored.counts, slow_counts(kept, scored.prediction, lambda flags: True))
-    moving, standing = scored.region_counts["moving"], scored.region_counts["standing"]
+    everywhere = slow_counts(kept, scored.prediction, lambda flags: True)
+    np.testing.assert_array_equal(scored.sums["iou", "all"][:, 0], everywhere)
+    moving, standing = np.moveaxis(scored.sums["iou", "actors"], 1, 0)
     np.testing.assert_array_equal(moving, slow_counts(kept, scored.prediction, lambda flags: flags in (2, 3)))
     np.testing.assert_array_equal(standing, slow_counts(kept, scored.prediction, lambda flags: flags == 1))
     assert [bool(counts.sum()) for counts in moving] == [True, True, False, True, True]  # number 2 has no truth
@@ -57,10 +58,6 @@ def test_class_and_certainty_are_those_of_the_largest_score_in_each_cell():
         cell = scores[n, :, row, column].tolist()
         assert scored.prediction[n, row, column] == cell.index(max(cell))
         assert scored.certainty[n, row, column] == round(min(max(cell), 1.0) * 255)
-
-
-def test_without_the_truth_there_are_no_regions():
-    assert evaluate(made(RepeatNewest), windows_of(random_recording(0))).region_counts == {}
 
 
 def test_no_window_is_an_error():

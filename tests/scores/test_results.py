@@ -1,49 +1,69 @@
-"""Counts on disk: regions where there is truth, and faults by name."""
+"""Sums on disk: of every metric by every partition that is known, and faults by name."""
 
 import numpy as np
 import pytest
+from support.windows import random_windows
 
-from semgrid_eval.arrays import write_arrays
-from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import ResultError
-from semgrid_eval.scores.results import LogRecord, ResultRecord, RunRecord, read_counts, scored_digest, write_counts
+from semgrid_eval.scores.metrics.table import count_windows
+from semgrid_eval.scores.results import (
+    LogRecord,
+    ResultRecord,
+    RunRecord,
+    check_sums,
+    is_done,
+    read_counts,
+    read_sums,
+    scored_digest,
+    write_sums,
+)
 
 
-def counts_of(windows, seed=0):
-    return np.random.default_rng(seed).integers(0, 99, (windows, CLASS_COUNT, CLASS_COUNT))
+def counted(**kwargs):
+    return dict(count_windows(random_windows(1, **kwargs)))
 
 
-def test_regions_come_back_as_they_were_written(tmp_path):
-    regions = {"moving": counts_of(3, 1), "standing": counts_of(3, 2)}
-    write_counts(tmp_path, counts_of(3), regions)
-    everywhere, found = read_counts(tmp_path)
-    np.testing.assert_array_equal(everywhere, counts_of(3))
-    assert list(found) == ["moving", "standing"]
-    for name, counts in regions.items():
-        np.testing.assert_array_equal(found[name], counts)
+def test_sums_come_back_as_they_were_written(tmp_path):
+    write_sums(tmp_path, counted())
+    for (metric, partition), sums in counted().items():
+        np.testing.assert_array_equal(read_sums(tmp_path, metric, partition), sums)
+    np.testing.assert_array_equal(read_counts(tmp_path), counted()["iou", "all"][:, 0])
+    check_sums(tmp_path, 3)
 
 
-def test_counts_without_the_truth_have_no_regions(tmp_path):
-    write_counts(tmp_path, counts_of(2), {})
-    assert read_counts(tmp_path)[1] == {}
+def test_sums_without_the_truth_have_no_actors(tmp_path):
+    write_sums(tmp_path, counted(actors=False))
+    assert read_sums(tmp_path, "iou", "actors") is None
+    check_sums(tmp_path, 3)
 
 
 @pytest.mark.parametrize(
-    ("moving", "message"),
+    ("change", "message"),
     [
-        (counts_of(3)[:, :4], r"counts\.npz: counts_moving: has shape \(3, 4, 10\), type int64"),
-        (counts_of(3).astype(np.int32), "counts_moving: has shape .* type int32"),
-        (counts_of(2), "counts_moving: has 2 windows, not 3"),
+        (lambda sums: sums[:, :, :4], r"sums\.npz: iou\.actors: has shape \(3, 2, 4, 10\), type int32"),
+        (lambda sums: sums[:, :1], r"iou\.actors: has shape \(3, 1, 10, 10\)"),
+        (lambda sums: sums.astype(np.int64), r"iou\.actors: has shape .* type int64"),
+        (lambda sums: sums[:2], r"iou\.actors: has 2 windows, and result\.json 3"),
+        (lambda sums: sums - 1, r"iou\.actors: is negative"),
     ],
 )
-def test_malformed_regions_are_named(tmp_path, moving, message):
-    write_arrays(tmp_path / "counts.npz", {"counts": counts_of(3), "counts_moving": moving})
+def test_malformed_sums_are_named(tmp_path, change, message):
+    sums = counted()
+    sums["iou", "actors"] = change(sums["iou", "actors"])
+    write_sums(tmp_path, sums)
     with pytest.raises(ResultError, match=message):
-        read_counts(tmp_path)
+        check_sums(tmp_path, 3)
 
 
-def test_missing_counts_are_named(tmp_path):
-    with pytest.raises(ResultError, match=r"counts\.npz: cannot be read"):
+def test_sums_of_a_metric_that_is_not_there_are_named(tmp_path):
+    write_sums(tmp_path, {key: sums for key, sums in counted().items() if key[0] != "accuracy"})
+    with pytest.raises(ResultError, match=r"has no array accuracy\.all"):
+        check_sums(tmp_path, 3)
+    assert not is_done(tmp_path)
+
+
+def test_missing_sums_are_named(tmp_path):
+    with pytest.raises(ResultError, match=r"sums\.npz: cannot be read"):
         read_counts(tmp_path)
 
 

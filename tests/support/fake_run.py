@@ -1,6 +1,6 @@
 """A plausible run folder, made in a second or two from nothing: streets, shifted inputs and imperfect predictors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
 from semgrid_eval.files import digest_value
-from semgrid_eval.report.rows.load import Result, Row
+from semgrid_eval.grids.spec import MOVING, STANDING, GridSpec
+from semgrid_eval.report.rows.load import Result, Row, SumsReader
 from semgrid_eval.scores import results
-from semgrid_eval.scores.iou import confusion
+from semgrid_eval.scores.metrics.metric import ScoredWindows
+from semgrid_eval.scores.metrics.table import count_windows
 
 SIDE = 128
 FRAME_NS = 58_823_529
@@ -133,8 +135,21 @@ def counted_row(
         sensors=("front",),
         translate=True,
     )
-    regions = {region: _hit_counts(each, cells) for region, each in (near or {}).items()}
-    return Row(name, row, (Result(record, counts, regions, None, Path()),), (), Path())
+    sums = {("iou", "all"): counts[:, None]}
+    if near:
+        sums["iou", "actors"] = np.stack([_hit_counts(near[region], cells) for region in ("moving", "standing")], 1)
+    return Row(name, row, (Result(record, reader(sums), None, Path()),), (), Path())
+
+
+def reader(sums: dict[tuple[str, str], NDArray[np.int32]]) -> SumsReader:
+    """Let a result have its sums in memory."""
+    return lambda metric, partition: sums.get((metric, partition))
+
+
+def with_counts(result: Result, counts: NDArray[np.integer], **changes: object) -> Result:
+    """Give a result other confusion counts (N, C, C) of all cells, and its record other fields."""
+    record = result.record.model_copy(update=changes)
+    return replace(result, read=reader({("iou", "all"): np.asarray(counts, np.int32)[:, None]}), record=record)
 
 
 def facts(
@@ -181,7 +196,8 @@ class _Maker:
         self.target = np.array([s[1] for s in scenes], np.uint8).reshape(-1, SIDE, SIDE)
         self.truth = np.array([s[2] for s in scenes], np.uint8).reshape(-1, SIDE, SIDE)
         near = np.array([s[3] for s in scenes], bool).reshape(-1, 2, SIDE, SIDE)
-        self.regions = dict(zip(results.REGIONS, near.swapaxes(0, 1), strict=True)) if truth else {}
+        flags = near[:, 0] * MOVING + near[:, 1] * STANDING
+        self.actors = flags.astype(np.uint8) if truth else None
         self.mask = (self.past != UNKNOWN).any(1) & (self.target == UNKNOWN)
 
     def row(self, row: FakeRow) -> results.RowRecord:
@@ -232,8 +248,8 @@ class _Maker:
         result_id = digest_value([config, seed, self.names])
         folder = results.result_folder(self.run, result_id)
         results.write_arrays(folder / "predictions.npz", {"prediction": prediction, "certainty": certainty})
-        near = {name: confusion(self.target, prediction, self.mask | ~region) for name, region in self.regions.items()}
-        results.write_counts(folder, confusion(self.target, prediction, self.mask), near)
+        scored = ScoredWindows(self.target, prediction, certainty, self.mask, inputs, self.actors, GridSpec())
+        results.write_sums(folder, count_windows(scored))
         if trained:
             (folder / "history.csv").write_text(_history(seed, row.wrong))
         record = results.ResultRecord(

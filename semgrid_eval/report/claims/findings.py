@@ -179,7 +179,7 @@ def _outcome(check: Check, places: Mapping[str, Scores]) -> Outcome:
         difference = _time_difference(check, rows)
     else:
         difference = weighted_sum([(weight, rows[name]) for name, weight in check.weights.items()], check.score)
-    windows = min(rows[name].row.windows for name in check.weights)
+    windows = min(rows[name].windows for name in check.weights)
     return Outcome(check, judge(check.rule, difference), difference, windows, text)
 
 

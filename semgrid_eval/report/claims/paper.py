@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.scores.iou import category_iou
+from semgrid_eval.scores.metrics.iou import category_iou
 
 PAPER_SETTINGS = {
     "settings.depth": ("depth", 3),

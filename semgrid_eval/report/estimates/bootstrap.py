@@ -1,4 +1,4 @@
-"""Scores of each row with intervals: a bootstrap over recordings and, where there are several, over seeds.
+"""Figures of each row with intervals: a bootstrap over recordings and, where there are several, over seeds.
 
 Every row of a report is resampled with the same draws of recordings, and rows of as many seeds with the same draws of
 seeds, so that differences between rows are paired. A recording is a whole log, whatever stretches it was cut into.
@@ -11,32 +11,19 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
+from semgrid_eval.report.estimates.division import EVERYWHERE, Division
+from semgrid_eval.report.estimates.resampling import DRAWS, Draws, Resampling
+from semgrid_eval.report.estimates.sums import RegionSums, row_sums
 from semgrid_eval.report.rows.load import Result, Row
-from semgrid_eval.scores.iou import Counts, category_iou, class_iou, mean_finite, merged_category_iou
+from semgrid_eval.scores.metrics import iou
+from semgrid_eval.scores.metrics.metric import Counts, Floats, Metric, column_names, mean_finite
+from semgrid_eval.scores.metrics.table import IOU, METRICS
 
-Array = NDArray[np.float64]
-
-DRAWS = 1000
 LEVEL = 0.95
-CATEGORY_COLUMNS = ("static", "static_known", "small_static", "vehicles", "small_dynamic", "mean_known")
-MERGED_COLUMNS = tuple(f"merged_{name}" for name in CATEGORY_COLUMNS if name != "mean_known")
-COLUMNS = (*CLASS_NAMES, *CATEGORY_COLUMNS, *MERGED_COLUMNS)
-"""Everything that is scored: the classes, the categories, and the categories with their classes merged."""
-LABELS = {
-    "static": "Static",
-    "static_known": "Static (known)",
-    "small_static": "Small static",
-    "vehicles": "Vehicles",
-    "small_dynamic": "Small dynamic",
-    "mean_known": "Mean (known)",
-    **{name: name.replace("_", " ") for name in CLASS_NAMES},
-    "merged_static": "Static (merged)",
-    "merged_static_known": "Static (known, merged)",
-    "merged_small_static": "Small static (merged)",
-    "merged_vehicles": "Vehicles (merged)",
-    "merged_small_dynamic": "Small dynamic (merged)",
-}
+CATEGORY_COLUMNS, MERGED_COLUMNS = iou.CATEGORY_COLUMNS, iou.MERGED_COLUMNS
+COLUMNS = column_names(IOU)
+"""Everything that is scored by IoU: the classes, the categories, and the categories with their classes merged."""
+LABELS = {column.name: column.label for column in IOU.columns}
 """Each of `COLUMNS` in words."""
 
 
@@ -56,90 +43,131 @@ class Estimate:
 
 @dataclass(frozen=True)
 class RowScores:
-    """Scores of one row over Q = `COLUMNS`: by seed (S, Q), and the bootstrap's draws (B, Q) of their mean."""
+    """Figures of one row in one region.
+
+    Args:
+        row: the row.
+        metric: whose Q columns these are.
+        results: the S results behind them.
+        by_seed: (S, Q) figures of each result.
+        draws: (B, Q) of their mean, resampled.
+        totals: (S, *shape) sums over windows.
+        windows: how many windows have something to count in the region.
+    """
 
     row: Row
-    by_seed: Array
-    draws: Array
+    metric: Metric
+    results: tuple[Result, ...]
+    by_seed: Floats
+    draws: Floats
+    totals: Counts
+    windows: int
 
     @cached_property
     def mean(self) -> dict[str, float]:
         """The mean over seeds of each column."""
-        return dict(zip(COLUMNS, mean_finite(self.by_seed, axis=0).tolist(), strict=True))
+        return dict(zip(column_names(self.metric), mean_finite(self.by_seed, axis=0).tolist(), strict=True))
+
+    @cached_property
+    def cells(self) -> dict[str, int]:
+        """The cells behind each column, in one result."""
+        return dict(zip(column_names(self.metric), self.metric.cells(self.totals[0]).tolist(), strict=True))
 
     def estimate(self, column: str) -> Estimate:
         """Return a column's mean over seeds with its interval."""
-        return _estimate(self.mean[column], self.draws[:, COLUMNS.index(column)])
+        return weighted_sum([(1, self)], column)
 
     def minus(self, other: "RowScores", column: str) -> Estimate:
-        """Return the paired difference to another row."""
+        """Return the paired difference to another row.
+
+        Raises:
+            ValueError: the rows have other targets.
+        """
         return weighted_sum([(1, self), (-1, other)], column)
 
 
 Scores = Mapping[str, RowScores]
 """Rows' scores by their names."""
+Parts = Mapping[str, Scores]
+"""Scores by the name of the region."""
+Everything = Mapping[str, Mapping[str, Parts]]
+"""Scores by the names of metric, division and region."""
+
+
+def comparable(first: Row, second: Row) -> bool:
+    """Tell whether rows are scored on the same targets, so that their scores may be subtracted."""
+    return first.targets == second.targets
 
 
 def weighted_sum(parts: Sequence[tuple[float, RowScores]], column: str) -> Estimate:
-    """Add up rows' scores by their weights, draw by draw."""
-    at = COLUMNS.index(column)
+    """Add up rows' scores by their weights, draw by draw.
+
+    Raises:
+        ValueError: the rows have other targets.
+    """
+    first = parts[0][1]
+    for _, entry in parts:
+        if not comparable(first.row, entry.row):
+            raise ValueError(f"{first.row.name} and {entry.row.name} are scored on other targets")
+    at = column_names(first.metric).index(column)
     value = sum(weight * entry.mean[column] for weight, entry in parts)
     return _estimate(value, np.sum([weight * entry.draws[:, at] for weight, entry in parts], axis=0))
 
 
-def score_columns(counts: Counts) -> Array:
-    """Score pooled counts (..., C, C) -> (..., Q) in the order of `COLUMNS`."""
-    classes = class_iou(counts)
-    merged = {f"merged_{name}": values for name, values in merged_category_iou(counts).items()}
-    found = category_iou(classes) | merged
-    parts = [found[name] for name in (*CATEGORY_COLUMNS, *MERGED_COLUMNS)]
-    return np.concatenate([classes, np.stack(parts, axis=-1)], axis=-1)
+def score_rows(rows: Iterable[Row], seed: int | np.random.Generator, *, draws: int = DRAWS) -> Scores:
+    """Score rows by name by the IoU of all cells; rows without windows are left out."""
+    return score_regions(list(rows), IOU, EVERYWHERE, Resampling(seed, draws)).get("all", {})
 
 
-def score_rows(rows: Iterable[Row], generator: np.random.Generator, *, draws: int = DRAWS) -> dict[str, RowScores]:
-    """Score rows by name, all of them with the same draws of recordings; rows without windows are left out."""
-    rows = [row for row in rows if row.windows]
-    names = sorted({window.drive for row in rows for result in row.results for window in result.record.windows})
-    weights = recording_weights(len(names), generator, draws=draws)
-    index = {name: i for i, name in enumerate(names)}
-    counts = sorted({len(row.results) for row in rows})
-    picks = {count: generator.multinomial(count, np.full(count, 1 / count), size=len(weights)) for count in counts}
-    return {row.name: _score_row(row, index, weights, picks[len(row.results)]) for row in rows}
+def score_all(rows: Sequence[Row], divisions: Sequence[Division], resampling: Resampling) -> Everything:
+    """Score rows by every metric in all regions of the divisions."""
+    return {
+        metric.name: {each.name: score_regions(rows, metric, each, resampling) for each in divisions}
+        for metric in METRICS.values()
+    }
 
 
-def recording_weights(recordings: int, generator: np.random.Generator, *, draws: int) -> NDArray[np.int64]:
-    """Draw how often each recording counts in each resample: (B, R); no draws where one recording is all there is."""
-    if recordings < 2:
-        return np.zeros((0, recordings), np.int64)
-    return generator.multinomial(recordings, np.full(recordings, 1 / recordings), size=draws)
+def score_regions(rows: Sequence[Row], metric: Metric, division: Division, resampling: Resampling) -> dict[str, Scores]:
+    """Score rows by a metric in each region of a division; regions and rows with nothing to count are left out."""
+    sums = {row.name: row_sums(row, metric, division) for row in rows}
+    found: dict[str, Scores] = {}
+    for number, region in enumerate(division.regions):
+        mine = {row.name: sums[row.name].region(number) for row in rows}
+        scores = _score_region([row for row in rows if mine[row.name].windows], mine, metric, resampling)
+        if scores:
+            found[region] = scores
+    return found
 
 
-def counts_by_recording(result: Result, index: dict[str, int]) -> NDArray[np.int64]:
-    """Sum the counts of a result's windows by recording: -> (R, C, C)."""
-    total = np.zeros((len(index), CLASS_COUNT, CLASS_COUNT), np.int64)
-    np.add.at(total, [index[window.drive] for window in result.record.windows], result.counts)
-    return total
+def _score_region(
+    rows: Sequence[Row], sums: Mapping[str, RegionSums], metric: Metric, resampling: Resampling
+) -> dict[str, RowScores]:
+    groups = {name: group for row in rows for name, group in sums[row.name].groups.items()}
+    names = sorted(groups)
+    draws = resampling.draw([groups[name] for name in names], [len(sums[row.name].results) for row in rows])
+    weights = draws.weights.astype(np.float64)  # BLAS knows floats only; exact below 2**53
+    return {row.name: _score_row(row, sums[row.name], metric, names, draws, weights) for row in rows}
 
 
-def _score_row(row: Row, index: dict[str, int], weights: NDArray[np.int64], picks: NDArray[np.int64]) -> RowScores:
-    by_seed = np.array([score_columns(result.counts.sum(axis=0, dtype=np.int64)) for result in row.results])
-    total, number = np.zeros((2, len(weights), len(COLUMNS)))
-    for seed, result in enumerate(row.results):
-        scores = _resampled_scores(counts_by_recording(result, index), weights)
-        present = np.isfinite(scores) * picks[:, seed, None]
-        total += present * np.nan_to_num(scores)
-        number += present
-    draws = np.divide(total, number, out=np.full(total.shape, np.nan), where=number > 0)
-    return RowScores(row, by_seed, draws)
+def _score_row(
+    row: Row, sums: RegionSums, metric: Metric, names: Sequence[str], draws: Draws, weights: Floats
+) -> RowScores:
+    by_recording = sums.by_recording(names)  # (R, S, K, 2)
+    flat = by_recording.reshape(len(names), -1).astype(np.float64)
+    resampled = np.rint(weights @ flat).astype(np.int64).reshape(-1, *by_recording.shape[1:])
+    by_seed = metric.figures(metric.ratios(sums.totals))
+    drawn = _over_seeds(metric.figures(resampled), draws.picks[len(sums.results)])
+    return RowScores(row, metric, sums.results, by_seed, drawn, sums.totals, sums.windows)
 
 
-def _resampled_scores(counts: NDArray[np.int64], weights: NDArray[np.int64]) -> Array:
-    flat = counts.reshape(len(counts), -1).astype(np.float64)  # BLAS knows floats only; exact below 2**53
-    total = np.rint(weights.astype(np.float64) @ flat).astype(np.int64)
-    return score_columns(total.reshape(-1, CLASS_COUNT, CLASS_COUNT))
+def _over_seeds(values: Floats, picks: NDArray[np.int64]) -> Floats:
+    """Take the mean over the seeds that each resample picked: (B, S, Q) and (B, S) -> (B, Q)."""
+    present = np.isfinite(values) * picks[:, :, None]
+    total, number = (present * np.nan_to_num(values)).sum(axis=1), present.sum(axis=1)
+    return np.asarray(np.divide(total, number, out=np.full(total.shape, np.nan), where=number > 0))
 
 
-def _estimate(value: float, draws: Array) -> Estimate:
+def _estimate(value: float, draws: Floats) -> Estimate:
     finite = draws[np.isfinite(draws)]
     if not np.isfinite(value) or len(finite) == 0:
         return Estimate(value, np.nan, np.nan)

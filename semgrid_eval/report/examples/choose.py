@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, KNOWN_IDS
 from semgrid_eval.report.rows.load import Result, Row, key_of
 from semgrid_eval.report.rows.pairing import Headline, reference_of
-from semgrid_eval.scores.iou import class_iou, mean_finite
+from semgrid_eval.scores.metrics.iou import class_iou
+from semgrid_eval.scores.metrics.metric import mean_finite
 from semgrid_eval.scores.results import WindowRecord
 
 MIN_CELLS = 10

@@ -5,35 +5,36 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from semgrid_eval import __version__
-from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_folder
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.report.claims.claims import MARGIN
 from semgrid_eval.report.claims.findings import Finding, find, finding_table, missing_table, sentence
 from semgrid_eval.report.claims.paper import paper_table
-from semgrid_eval.report.estimates.bootstrap import Scores, score_rows
+from semgrid_eval.report.estimates.bootstrap import Everything, Parts, Scores, score_all
+from semgrid_eval.report.estimates.division import Division
+from semgrid_eval.report.estimates.paces import EDGES_MPS
+from semgrid_eval.report.estimates.resampling import Level, Resampling
+from semgrid_eval.report.estimates.table import divisions
 from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
 from semgrid_eval.report.figures import bars, curves, diagrams
+from semgrid_eval.report.figures.calibration import calibration_plots
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.page import provenance
 from semgrid_eval.report.page.colours import class_style
 from semgrid_eval.report.page.summary import summarise
 from semgrid_eval.report.rows.load import Row, Run, load_runs
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, Headline, headline
-from semgrid_eval.report.tables import scores as tables
+from semgrid_eval.report.rows.pairing import Headline, headline
 from semgrid_eval.report.tables import write as exports
-from semgrid_eval.report.tables.changes import changes_table
-from semgrid_eval.report.tables.pace import PACE_EDGES_MPS, pace_tables, rows_without_pace, score_paces
-from semgrid_eval.report.tables.regions import region_tables, score_regions
+from semgrid_eval.report.tables.divisions import division_tables
+from semgrid_eval.report.tables.scores import confusion_table, score_tables
 from semgrid_eval.report.tables.table import Table
-from semgrid_eval.report.tables.where import Where, locate_rows
+from semgrid_eval.report.tables.write import Numbers
 
 PAGE = "index.html"
 _SEED = 20190623  # any number does; a fixed one gives the same run the same intervals
@@ -45,31 +46,40 @@ class Material:
 
     Args:
         runs: the runs as read from disk.
-        scores: scores of all rows that have some.
-        regions: the same of cells near moving and near standing actors alone.
-        paces: the same of windows by how fast the vehicle drives in them.
+        divisions: what is scored apart: regions of cells, and kinds of windows.
+        everything: scores by metric, division and region, of all rows that have some.
+        resampling: how their intervals were made.
         findings: what the runs say about the paper's claims.
-        located: where rows are right.
-        problems: of which rows that cannot be said, and why.
         figures: by section of the page.
     """
 
     runs: Sequence[Run]
-    scores: Scores
-    regions: Mapping[str, Scores]
-    paces: Mapping[str, Scores]
+    divisions: Sequence[Division]
+    everything: Everything
+    resampling: Resampling
     findings: Sequence[Finding]
-    located: Sequence[Where]
-    problems: Sequence[str]
     figures: Mapping[str, Sequence[Plot]]
 
+    @property
+    def scores(self) -> Scores:
+        """The IoU of all cells."""
+        return self.parts["all"].get("all", {})
 
-def write_report(run: Path | Sequence[Path], out: Path | None = None, *, progress: Progress = silent) -> Path:
+    @property
+    def parts(self) -> Mapping[str, Parts]:
+        """The IoU by division and region: `parts["actors"]["moving"]`."""
+        return self.everything["iou"]
+
+
+def write_report(
+    run: Path | Sequence[Path], out: Path | None = None, *, resample: Level = "recordings", progress: Progress = silent
+) -> Path:
     """Write the report of one run, or of several side by side, and return its page.
 
     Args:
         run: the folder of a run, or several.
         out: the folder to write; `report` in the (first) run where it is not given. A report there is replaced.
+        resample: what is resampled first: recordings, or groups of them (towns, cities, drives).
         progress: told of each row read.
 
     Raises:
@@ -80,40 +90,64 @@ def write_report(run: Path | Sequence[Path], out: Path | None = None, *, progres
         raise InputError("no run is given", field="run")
     out = folders[0] / "report" if out is None else out
     _check_replaceable(out)
-    material = gather(load_runs(folders, progress=progress))
+    material = gather(load_runs(folders, progress=progress), Resampling(_SEED, level=resample))
+    tables = page_tables(material)
     with atomic_folder(out) as folder:
-        parts = {"regions": material.regions, "paces": material.paces}
-        exports.write_tables(folder, material.runs, material.scores, parts, material.findings)
-        exports.write_located(folder, material.located)
+        exports.write_numbers(
+            folder, Numbers(material.runs, material.everything, material.resampling, material.findings)
+        )
+        exports.write_tables(folder, all_tables(tables))
         exports.write_figures(folder, material.figures)
-        (folder / PAGE).write_text(render_page(material), encoding="utf-8")
+        (folder / PAGE).write_text(render_page(material, tables), encoding="utf-8")
     return out / PAGE
 
 
-def gather(runs: Sequence[Run]) -> Material:
+def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
     """Work out everything that a report shows."""
     rows = [row for each in runs for row in each.rows]
-    scores = score_rows(rows, np.random.default_rng(_SEED))
-    regions = score_regions(rows, _SEED)
-    paces = score_paces(runs, [entry.row for entry in scores.values()], _SEED)
-    located, problems = locate_rows(entry.row for entry in scores.values())
-    figures = draw_figures(scores, rows, located)
-    return Material(runs, scores, regions, paces, find(runs, scores, regions), located, problems, figures)
+    parts = divisions(runs)
+    everything = score_all(rows, parts, resampling)
+    scores = everything["iou"]["all"].get("all", {})
+    figures = draw_figures(everything, rows)
+    return Material(runs, parts, everything, resampling, find(runs, scores, everything["iou"]["actors"]), figures)
 
 
-def draw_figures(scores: Scores, rows: Sequence[Row], located: Sequence[Where]) -> dict[str, list[Plot]]:
+def draw_figures(everything: Everything, rows: Sequence[Row]) -> dict[str, list[Plot]]:
     """Draw all figures by section of the page."""
+    scores, certainty = (everything[metric]["all"].get("all", {}) for metric in ("iou", "calibration"))
     return {
         "overview": bars.category_overview(scores),
         "categories": bars.category_plots(scores),
         "horizon": curves.horizon_plots(scores),
         "training": curves.training_plots(rows),
-        "calibration": diagrams.calibration_plots(located),
+        "calibration": calibration_plots(certainty),
         "architecture": diagrams.architecture_plots(scores),
     }
 
 
-def render_page(material: Material) -> str:
+@dataclass(frozen=True)
+class PageTables:
+    """The page's tables of scores: of all cells by name, and of every metric by division."""
+
+    scores: Mapping[str, Table | None]
+    divisions: Mapping[str, Sequence[Table]]
+
+
+def page_tables(material: Material) -> PageTables:
+    """Make the page's tables of scores."""
+    return PageTables(
+        score_tables(material.scores, [each.tag for each in material.runs]),
+        division_tables(material.everything, material.divisions),
+    )
+
+
+def all_tables(tables: PageTables) -> list[Table]:
+    """List the page's tables of scores that have something to show."""
+    found = [*tables.scores.values(), *(table for each in tables.divisions.values() for table in each)]
+    return [table for table in found if table is not None and table.bodies]
+
+
+def render_page(material: Material, tables: PageTables) -> str:
     """Render the page as HTML that needs nothing but itself."""
     runs, scores = material.runs, material.scores
     found = headline(scores)
@@ -134,23 +168,21 @@ def render_page(material: Material) -> str:
         runs=runs,
         title=", ".join(each.record.title for each in runs),
         summary=summarise(runs, scores, found),
-        tables=page_tables(runs, scores)
-        | tables.where_tables(material.located)
-        | region_tables(material.regions)
-        | pace_tables(material.paces),
+        resampled=material.resampling.sentence,
+        tables=tables.scores,
+        parts=tables.divisions,
         about_settings=sum(e.row.record.name not in paper_table() for e in scores.values()) > len(scores) / 2,
         findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
         margin=MARGIN,
         confusions=confusion_tables(scores, found),
-        problems=material.problems,
         figures=material.figures,
         legend=(*CLASS_LEGEND, MASK_LEGEND),
         right_legend=RIGHT_LEGEND,
         examples=examples,
         gaps=gaps(rows, examples),
         widths=widths(rows),
-        stands_mps=PACE_EDGES_MPS[0],
-        unpaced=rows_without_pace(rows, material.paces),
+        stands_mps=EDGES_MPS[0],
+        unpaced=rows_without(material.parts["paces"], rows),
         failures=provenance.failures(runs),
         logs=provenance.log_table(runs),
         results=provenance.result_table(runs),
@@ -159,19 +191,10 @@ def render_page(material: Material) -> str:
     )
 
 
-def page_tables(runs: Sequence[Run], scores: Scores) -> dict[str, Table | None]:
-    """Make the page's tables of scores; one with nothing to show is None or has no lines."""
-    return {
-        "categories": tables.category_values(scores),
-        "differences": tables.difference_table("differences", scores, DIFFERENCE_COLUMNS),
-        "class_differences": tables.difference_table("class-differences", scores, CLASS_NAMES),
-        "classes": tables.class_values(scores),
-        "changes": changes_table(scores),
-        "merged": tables.merged_values(scores),
-        "windows": tables.window_means(scores),
-        "runs": tables.run_differences(scores, [each.tag for each in runs], DIFFERENCE_COLUMNS),
-        "costs": tables.training_table(list(scores.values())),
-    }
+def rows_without(parts: Parts, rows: Sequence[Row]) -> list[str]:
+    """Name the rows that no region of a division has."""
+    known = {name for scores in parts.values() for name in scores}
+    return [row.name for row in rows if row.name not in known]
 
 
 def finding_view(tag: str, index: int, findings: Sequence[Finding]) -> dict[str, object]:
@@ -188,7 +211,7 @@ def finding_view(tag: str, index: int, findings: Sequence[Finding]) -> dict[str,
 def confusion_tables(scores: Scores, found: Headline | None) -> list[Table]:
     """Make the confusion tables of the best row and of the baseline it is measured against."""
     rows = [] if found is None else [row for row in (found.best, found.reference or found.rival) if row is not None]
-    return [tables.confusion_table(scores[row.name], f"confusion-{i}") for i, row in enumerate(rows)]
+    return [confusion_table(scores[row.name], f"confusion-{i}") for i, row in enumerate(rows)]
 
 
 def _check_replaceable(out: Path) -> None:

@@ -1,8 +1,8 @@
 """Reads a run's result files; what cannot be read becomes a failure of its row, and the rest goes on."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, SemgridError
 from semgrid_eval.grids.spec import GridConfig, GridSpec
@@ -22,10 +21,11 @@ from semgrid_eval.scores.results import (
     RowRecord,
     RunRecord,
     WindowRecord,
-    read_counts,
+    check_sums,
     read_history,
     read_result,
     read_run,
+    read_sums,
     result_folder,
 )
 
@@ -33,18 +33,36 @@ WindowReader = Callable[[Path, str], Mapping[str, NDArray[Any]]]
 """Reads a set of windows, as `scores.results.read_windows` does, from a run by its id."""
 
 
+SumsReader = Callable[[str, str], NDArray[np.int32] | None]
+"""Reads what a metric counted by a partition, as `scores.results.read_sums` does from a result's folder."""
+
+
 @dataclass(frozen=True)
 class Result:
-    """One readable result: its record, the counts (N, C, C) of its windows and its training history.
-
-    `regions` holds the counts near moving and near standing actors alone; it is empty where no log has the truth.
-    """
+    """One readable result: its record, its training history, and its sums, which are read when asked for."""
 
     record: ResultRecord
-    counts: NDArray[np.int32]
-    regions: Mapping[str, NDArray[np.int32]]
+    read: SumsReader
     history: pd.DataFrame | None
     folder: Path
+
+    @cached_property
+    def counts(self) -> NDArray[np.int32]:
+        """The confusion counts of all cells by window: (N, C, C)."""
+        counts = self.read("iou", "all")
+        assert counts is not None  # all cells are always counted
+        return counts[:, 0]
+
+    @cached_property
+    def recordings(self) -> tuple[NDArray[np.str_], NDArray[np.int64]]:
+        """The names (R,) of the drives that windows come from, and the index of each window's (N,)."""
+        names, owner = np.unique([window.drive for window in self.record.windows], return_inverse=True)
+        return names, owner
+
+    @cached_property
+    def log_of(self) -> Mapping[str, str]:
+        """The path of the log of each drive."""
+        return {window.drive: window.log for window in self.record.windows}
 
     @cached_property
     def grid(self) -> GridConfig | None:
@@ -53,11 +71,6 @@ class Result:
             return parse_config(GridConfig, self.record.config["grid"])
         except (KeyError, ConfigError):
             return None
-
-    def of_windows(self, used: NDArray[np.bool_], counts: NDArray[np.int32]) -> "Result":
-        """Return the result of the windows marked in `used` (N,) alone, with their part of other counts (N, C, C)."""
-        windows = tuple(window for window, kept in zip(self.record.windows, used, strict=True) if kept)
-        return replace(self, counts=counts[used], record=self.record.model_copy(update={"windows": windows}))
 
     @property
     def spec(self) -> GridSpec:
@@ -84,6 +97,7 @@ class Row:
     results: tuple[Result, ...]
     failures: tuple[str, ...]
     run: Path
+    groups: Mapping[str, str] = field(default_factory=dict)  # by a log's path: the town, city or drive it belongs to
 
     @property
     def is_left(self) -> bool:
@@ -92,8 +106,8 @@ class Row:
 
     @property
     def is_baseline(self) -> bool:
-        """Whether the row is one of the model-driven baselines, which need no training."""
-        return self.record.model == "BL"
+        """Whether other rows are measured against it."""
+        return self.record.facts.baseline
 
     @property
     def shown(self) -> Result:
@@ -109,7 +123,12 @@ class Row:
     @property
     def windows(self) -> int:
         """Windows behind the row's scores."""
-        return max((len(result.counts) for result in self.results), default=0)
+        return max((len(result.record.windows) for result in self.results), default=0)
+
+    @property
+    def targets(self) -> str:
+        """The key that rows must share to be subtracted from each other."""
+        return self.results[0].record.targets if self.results else ""
 
     @property
     def window_ms(self) -> tuple[float, ...]:
@@ -136,9 +155,9 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
     records = [read_run(folder) for folder in folders]
     total, done, runs = sum(len(record.rows) for record in records), 0, []
     for folder, tag, record in zip(folders, _tags(folders), records, strict=True):
-        rows = []
+        rows, load = [], _Loader(folder, {log.path: log.group for log in record.logs})
         for row in record.rows:
-            rows.append(_load_row(folder, row, f"{row.name} ({tag})" if tag else row.name))
+            rows.append(load.row(row, f"{row.name} ({tag})" if tag else row.name))
             done += 1
             progress(done, total, row.name)
         runs.append(Run(folder, tag, record, tuple(rows)))
@@ -169,26 +188,30 @@ def _tags(folders: Sequence[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [f"run {i}" for i in range(1, len(folders) + 1)]
 
 
-def _load_row(run: Path, row: RowRecord, name: str) -> Row:
-    failures = [] if row.failure in (None, NOT_RUN) else [row.failure]
-    found = []
-    for result_id in row.results:
-        try:
-            found.append(_load_result(result_folder(run, result_id)))
-        except (SemgridError, OSError, ValueError) as error:
-            failures.append(str(error))
-    if not row.results and row.failure is None:
-        failures.append("it has no result")
-    if found and not any(len(result.counts) for result in found):
-        failures.append("it has no window to score")
-    return Row(name, row, tuple(found), tuple(failures), run)
+class _Loader:
+    """Reads the rows of one run; results that have the same windows share the records of them."""
 
+    def __init__(self, run: Path, groups: Mapping[str, str]) -> None:
+        self._run, self._groups = run, groups
+        self._windows: dict[tuple[WindowRecord, ...], tuple[WindowRecord, ...]] = {}
 
-def _load_result(folder: Path) -> Result:
-    record, (counts, near) = read_result(folder), read_counts(folder)
-    if len(counts) != len(record.windows):
-        raise ValueError(f"{folder / 'counts.npz'}: {len(counts)} windows, but result.json has {len(record.windows)}")
-    if counts.min(initial=0) < 0 or counts.sum(axis=(1, 2)).max(initial=0) > np.iinfo(np.int32).max // CLASS_COUNT:
-        raise ValueError(f"{folder / 'counts.npz'}: counts are negative or beyond any grid")
-    regions = {name: values.astype(np.int32) for name, values in near.items()}
-    return Result(record, counts.astype(np.int32), regions, read_history(folder), folder)
+    def row(self, row: RowRecord, name: str) -> Row:
+        failures = [] if row.failure in (None, NOT_RUN) else [row.failure]
+        found = []
+        for result_id in row.results:
+            try:
+                found.append(self._result(result_folder(self._run, result_id)))
+            except (SemgridError, OSError, ValueError) as error:
+                failures.append(str(error))
+        if not row.results and row.failure is None:
+            failures.append("it has no result")
+        if found and not any(result.record.windows for result in found):
+            failures.append("it has no window to score")
+        return Row(name, row, tuple(found), tuple(failures), self._run, self._groups)
+
+    def _result(self, folder: Path) -> Result:
+        record = read_result(folder)
+        windows = self._windows.setdefault(record.windows, record.windows)
+        check_sums(folder, len(windows))
+        shared = record.model_copy(update={"windows": windows})
+        return Result(shared, partial(read_sums, folder), read_history(folder), folder)

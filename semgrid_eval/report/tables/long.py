@@ -1,48 +1,98 @@
-"""The long-form tables of a report: one line for each row of the matrix, seed and class or category."""
+"""The long tables of a report: a line for every figure with its interval, and one for every figure of every seed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.report.estimates.bootstrap import CATEGORY_COLUMNS, COLUMNS, MERGED_COLUMNS, RowScores
-from semgrid_eval.scores.iou import averaged_members, merged_members
+from semgrid_eval.report.estimates.bootstrap import Estimate, Everything, RowScores, Scores
+from semgrid_eval.report.tables.table import finite
+from semgrid_eval.report.tables.values import reference_scores
+from semgrid_eval.scores.metrics.metric import column_names
 
+SUMMARY_COLUMNS = (
+    *("row", "metric", "division", "region", "column", "value", "low", "high"),
+    *("reference", "difference", "difference_low", "difference_high", "cells", "windows", "seeds"),
+)
+SEED_COLUMNS = ("row", "seed", "metric", "division", "region", "column", "value", "cells", "windows")
 
-def members() -> dict[str, tuple[int, ...]]:
-    """Return the class ids behind each of `estimates.COLUMNS`."""
-    table: dict[str, tuple[int, ...]] = {name: (index,) for index, name in enumerate(CLASS_NAMES)}
-    table |= averaged_members() | {f"merged_{name}": ids for name, ids in merged_members().items()}
-    return {name: table[name] for name in COLUMNS}
-
-
-def class_table(scores: Sequence[RowScores]) -> pd.DataFrame:
-    """Return the table with columns row, experiment, model, class, iou, windows, cells, seed."""
-    return _long(scores, CLASS_NAMES, "class")
-
-
-def category_table(scores: Sequence[RowScores]) -> pd.DataFrame:
-    """Return the table with columns row, experiment, model, category, iou, windows, cells, seed."""
-    return _long(scores, (*CATEGORY_COLUMNS, *MERGED_COLUMNS), "category")
+Records = Mapping[str, Mapping[str, Mapping[str, Mapping[str, dict[str, Any]]]]]
+"""What machines may want to know of a row, by the names of metric, division, region and row."""
+_Place = dict[str, str]
+T = TypeVar("T")
 
 
-def target_cells(counts: NDArray[np.integer]) -> dict[str, int]:
-    """Count the target's cells outside M behind each of `estimates.COLUMNS`: from counts (N, C, C)."""
-    cells = counts.sum(axis=(0, 2), dtype=np.int64)
-    return {name: int(cells[list(ids)].sum()) for name, ids in members().items()}
+def summary_frame(records: Records) -> pd.DataFrame:
+    """Return one line for every figure of `division_records`."""
+    lines = [
+        {**place, "row": name, "column": column, **_numbers(record, column)}
+        for place, region in _regions(records)
+        for name, record in region.items()
+        for column in record["scores"]
+    ]
+    return pd.DataFrame(lines, columns=list(SUMMARY_COLUMNS))
 
 
-def _long(scores: Sequence[RowScores], names: tuple[str, ...], kind: str) -> pd.DataFrame:
-    lines = []
-    for entry in scores:
-        record = entry.row.record
-        key = (entry.row.name, record.experiment, record.model)
-        for result, values in zip(entry.row.results, entry.by_seed, strict=True):
-            cells, seed = target_cells(result.counts), result.record.seed
-            for name in names:
-                iou = values[COLUMNS.index(name)]
-                lines.append((*key, name, iou, len(result.counts), cells[name], seed))
-    table = pd.DataFrame(lines, columns=["row", "experiment", "model", kind, "iou", "windows", "cells", "seed"])
-    return table.astype({"iou": "float64", "windows": "int64", "cells": "int64", "seed": "Int64"})
+def seed_frame(everything: Everything) -> pd.DataFrame:
+    """Return one line for every figure of every row and seed."""
+    parts = [_seeds(entry, place) for place, scores in _regions(everything) for entry in scores.values()]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(SEED_COLUMNS))
+
+
+def division_records(everything: Everything) -> Records:
+    """Return every figure with its interval and its difference to the row's baseline, for machines."""
+    return {
+        metric: {
+            division: {
+                region: {name: _record(entry, scores) for name, entry in scores.items()}
+                for region, scores in parts.items()
+            }
+            for division, parts in divisions.items()
+        }
+        for metric, divisions in everything.items()
+    }
+
+
+def _regions(of: Mapping[str, Mapping[str, Mapping[str, T]]]) -> Iterator[tuple[_Place, T]]:
+    for metric, divisions in of.items():
+        for division, parts in divisions.items():
+            for region, found in parts.items():
+                yield {"metric": metric, "division": division, "region": region}, found
+
+
+def _record(entry: RowScores, scores: Scores) -> dict[str, Any]:
+    other, columns = reference_scores(entry, scores), column_names(entry.metric)
+    return {
+        "windows": entry.windows,
+        "seeds": len(entry.results),
+        "cells": entry.cells,
+        "scores": {column: _estimate(entry.estimate(column)) for column in columns},
+        "reference": None if other is None else other.row.name,
+        "differences": {} if other is None else {column: _estimate(entry.minus(other, column)) for column in columns},
+    }
+
+
+def _estimate(estimate: Estimate) -> dict[str, float | None]:
+    return {name: finite(value) for name, value in vars(estimate).items()}
+
+
+def _numbers(record: dict[str, Any], column: str) -> dict[str, Any]:
+    difference = record["differences"].get(column, {})
+    return {
+        **record["scores"][column],
+        "reference": record["reference"],
+        "difference": difference.get("value"),
+        **{f"difference_{end}": difference.get(end) for end in ("low", "high")},
+        "cells": record["cells"][column],
+        "windows": record["windows"],
+        "seeds": record["seeds"],
+    }
+
+
+def _seeds(entry: RowScores, place: _Place) -> pd.DataFrame:
+    columns = column_names(entry.metric)
+    seed = pd.array([result.record.seed for result in entry.results], dtype="Int64").repeat(len(columns))
+    frame = pd.DataFrame({"seed": seed, "column": list(columns) * len(entry.results), "value": entry.by_seed.ravel()})
+    cells = np.asarray(entry.metric.cells(entry.totals)).ravel()
+    return frame.assign(row=entry.row.name, **place, cells=cells, windows=entry.windows)[list(SEED_COLUMNS)]

@@ -2,23 +2,27 @@
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from semgrid_eval.report.estimates.bootstrap import LEVEL, Estimate
 from semgrid_eval.report.rows.pairing import verdict
 
+Better = Literal["higher", "lower", ""]
+"""Which of two values is the better one; empty where neither is."""
 ABSENT = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One cell: its text, the value it sorts by, a small second line, a tooltip and a tone for its style."""
+    """One cell: its text, the value that it sorts by, a small second line, a tooltip, a tone and an interval."""
 
     text: str
     sort: float | None = None
     note: str = ""
     title: str = ""
     tone: str = ""
+    interval: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -76,19 +80,31 @@ def plural(count: int, noun: str) -> str:
 
 def value_cell(estimate: Estimate, *, title: str = "", best: bool = False) -> Cell:
     """Show a score with its interval."""
-    return Cell(number(estimate.value), _sortable(estimate.value), interval(estimate), title, "best" if best else "")
+    tone = "best" if best else ""
+    return Cell(number(estimate.value), finite(estimate.value), interval(estimate), title, tone, _bounds(estimate))
 
 
-def difference_cell(difference: Estimate, *, title: str = "") -> Cell:
+def difference_cell(difference: Estimate, *, title: str = "", better: Better = "higher") -> Cell:
     """Show a difference with its interval, toned by its verdict."""
-    note = interval(difference, with_sign=True)
-    return Cell(signed(difference.value), _sortable(difference.value), note, title, verdict(difference))
+    note, tone = interval(difference, with_sign=True), _tone(difference, better)
+    return Cell(signed(difference.value), finite(difference.value), note, title, tone, _bounds(difference))
 
 
 def plain_cell(value: float, *, title: str = "") -> Cell:
     """Show a number without an interval."""
-    return Cell(number(value), _sortable(value), title=title)
+    return Cell(number(value), finite(value), title=title)
 
 
-def _sortable(value: float) -> float | None:
+def finite(value: float) -> float | None:
+    """Return a value, None where it is absent."""
     return value if math.isfinite(value) else None
+
+
+def _bounds(estimate: Estimate) -> tuple[float, float] | None:
+    return (estimate.low, estimate.high) if math.isfinite(estimate.low) else None
+
+
+def _tone(difference: Estimate, better: Better) -> str:
+    if better == "lower":
+        difference = Estimate(-difference.value, -difference.high, -difference.low)
+    return verdict(difference) if better else ""

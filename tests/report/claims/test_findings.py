@@ -19,11 +19,13 @@ from semgrid_eval.report.claims.findings import (
     missing_table,
     sentence,
 )
-from semgrid_eval.report.estimates.bootstrap import Estimate, score_rows
+from semgrid_eval.report.estimates.bootstrap import Estimate, score_regions, score_rows
+from semgrid_eval.report.estimates.division import of_cells
+from semgrid_eval.report.estimates.resampling import Resampling
 from semgrid_eval.report.rows.load import Run, load_runs
-from semgrid_eval.report.tables.regions import score_regions
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.scores.results import REGIONS
+from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores.regions.actors import ACTORS
 
 RECORDINGS = 12
 HOLDS, FAILS, OPEN, NOT_RUN = Verdict.HOLDS, Verdict.FAILS, Verdict.OPEN, Verdict.NOT_RUN
@@ -36,10 +38,14 @@ def _hits(value, *, small=40, car=None):
     return {name: hits if isinstance(hits, list) else [hits] * RECORDINGS for name, hits in each.items()}
 
 
+def _near(rows):
+    return score_regions(rows, IOU, of_cells(ACTORS), Resampling(0))
+
+
 def _findings(*rows):
     run = Run(Path(), "", None, tuple(rows))
     scores = score_rows(rows, np.random.default_rng(0), draws=200)
-    return {each.claim.name: each for each in find([run], scores, score_regions(rows, 0))}
+    return {each.claim.name: each for each in find([run], scores, _near(rows))}
 
 
 def _row(name, value=50, **kwargs):
@@ -191,7 +197,7 @@ def test_every_claim_can_hold_fail_and_stay_undecided(claim, wanted):
     run = Run(Path(), "", None, tuple(_rows_for(claim, wanted)))
     builds = [row.name for row in run.rows if row.name.startswith("ED-d")]
     scores = score_rows(run.rows, np.random.default_rng(0), draws=100)
-    found = {each.claim.name: each for each in find([run], scores, score_regions(run.rows, 0))}[claim.name]
+    found = {each.claim.name: each for each in find([run], scores, _near(run.rows))}[claim.name]
     assert found.claim.checks == next(c.checks for c in claims(builds or ROWS) if c.name == claim.name)
     assert found.verdict is wanted, [(o.text, o.verdict, o.difference) for o in found.outcomes]
 
@@ -248,7 +254,7 @@ def test_each_run_has_its_own_findings(tmp_path):
     ]
     runs = load_runs(folders)
     every = [row for run in runs for row in run.rows]
-    found = find(runs, score_rows(every, np.random.default_rng(0), draws=20), score_regions(every, 0))
+    found = find(runs, score_rows(every, np.random.default_rng(0), draws=20), _near(every))
     assert {each.run for each in found if each.verdict is not NOT_RUN} == {"one"}
     assert {each.run for each in found} == {"one", "two"}
     captions = {
@@ -257,4 +263,4 @@ def test_each_run_has_its_own_findings(tmp_path):
         for tag in ("one", "two")
     }
     assert len(captions) == 4
-    assert set(REGIONS) == set(score_regions(every, 0))
+    assert set(ACTORS.regions) == set(_near(every))

@@ -24,8 +24,10 @@ def _configured(run, repeats, windows, **settings):
     rows = []
     for row in run.rows:
         first = row.results[0]
-        record = first.record.model_copy(update={"config": {"settings": settings}})
-        results = (replace(first, record=record, counts=first.counts[:1].repeat(windows, axis=0)),) * repeats
+        record = first.record.model_copy(
+            update={"config": {"settings": settings}, "windows": first.record.windows[:1] * windows}
+        )
+        results = (replace(first, record=record),) * repeats
         rows.append(replace(row, results=results))
     return replace(run, rows=tuple(rows))
 

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.fake_run import FakeRow, make_fake_run
+from support.fake_run import FakeRow, make_fake_run, with_counts
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.report.estimates.bootstrap import score_rows
@@ -34,8 +34,7 @@ def _with_counts(row, counts):
         result.record.windows[0].model_copy(update={"recording": f"r{i}", "target_frame": i})
         for i in range(len(counts))
     )
-    record = result.record.model_copy(update={"windows": windows})
-    return replace(row, results=(replace(result, counts=np.array(counts, np.int32), record=record),))
+    return replace(row, results=(with_counts(result, counts, windows=windows),))
 
 
 def _car(hits, cells=100):
@@ -67,11 +66,8 @@ def test_a_class_with_few_cells_does_not_count(run):
 def test_windows_are_compared_by_target_frame_whatever_their_order(run):
     rows = _rows(run)
     rival = rows["BL-DC"]
-    flipped = replace(
-        rival.results[0],
-        counts=rival.results[0].counts[::-1],
-        record=rival.results[0].record.model_copy(update={"windows": rival.results[0].record.windows[::-1]}),
-    )
+    result = rival.results[0]
+    flipped = with_counts(result, result.counts[::-1], windows=result.record.windows[::-1])
     straight = rule_values(Contest(rows["ED-DC"], (rival,)))
     turned = rule_values(Contest(rows["ED-DC"], (replace(rival, results=(flipped,)),)))
     np.testing.assert_array_equal(straight, turned)
@@ -150,7 +146,7 @@ def test_the_iou_of_a_window_is_the_mean_over_known_classes_with_enough_cells(ru
     result = row.shown
     counts = result.counts.copy()
     counts[0, ROAD, ROAD], counts[0, 0, 0] = 60, 1000
-    result = replace(result, counts=counts)
+    result = with_counts(result, counts)
     first, second = result.record.windows
     assert mean_iou(result, first) == pytest.approx((80 / 100 + 60 / 80) / 2)  # 20 cells of car were taken for road
     assert np.isnan(mean_iou(result, second))

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.fake_run import with_counts
 
 from semgrid_eval.report.examples.choose import Contest, Pick
 from semgrid_eval.report.examples.drawing import HATCH_LEGEND, MASK_LEGEND
@@ -113,8 +114,8 @@ def test_columns_are_neither_too_wide_nor_too_narrow(seen, lengths, expected):
 def test_a_rival_without_the_window_is_left_out(seen):
     run, rows = opened(seen)
     rival = rows["BL-DC"]
-    record = rival.shown.record.model_copy(update={"windows": rival.shown.record.windows[1:]})
-    shorter = replace(rival, results=(replace(rival.shown, record=record, counts=rival.shown.counts[1:]),))
+    shown = with_counts(rival.shown, rival.shown.counts[1:], windows=rival.shown.record.windows[1:])
+    shorter = replace(rival, results=(shown,))
     (example,) = draw_examples(Shown(Contest(rows["own-DC"], (shorter,)), {PICK.index}), (PICK,), Glimpses(run))
     assert [column.title for column in example.answers] == ["own-DC", "Certainty"]
     assert np.all([column.pictures for column in example.answers])

@@ -122,14 +122,14 @@ def test_failures_and_provenance_are_told(page):
 
 
 def test_the_tables_hold_the_numbers_of_the_long_form(page):
-    classes = pd.read_csv(page.parent / "classes.csv")
-    row = classes[(classes.experiment == "DC") & (classes.model == "ED") & (classes["class"] == "car")]
-    assert f"{row.iou.mean():.3f}" in _read(page).text
+    scores = pd.read_csv(page.parent / "scores.csv")
+    row = scores[(scores.row == "ED-DC") & (scores.division == "all") & (scores.column == "car")]
+    assert f"{row.value.mean():.3f}" in _read(page).text
 
 
 def test_files_beside_the_page_are_there(page):
     names = {str(path.relative_to(page.parent)) for path in page.parent.rglob("*") if path.is_file()}
-    assert {"index.html", "classes.csv", "categories.csv", "summary.csv", "summary.md", "summary.tex"} <= names
+    assert {"index.html", "scores.csv", "summary.csv", "calibration.csv", "summary.md", "summary.tex"} <= names
     for name in ("categories", "category_static", "training"):
         assert {f"figures/{name}.png", f"figures/{name}.svg"} <= names
 
@@ -181,7 +181,7 @@ def test_failed_rows_only(tmp_path):
     text = _read(page).text
     assert "No row has a score" in text
     assert "row ED-DC out of memory" in text
-    assert pd.read_csv(page.parent / "classes.csv").empty
+    assert pd.read_csv(page.parent / "scores.csv").empty
     assert read_json(page.parent / "report.json")["rows"]["ED-DC"]["scores"] == {}
 
 
@@ -211,12 +211,13 @@ def test_one_row_only(lonely):
     assert "No row was trained" in text
     assert "This run lacks the rows to test any of the 25 claims" in text
     assert "No result here knows the truth about actors" in text
-    assert pd.read_csv(lonely.parent / "regions.csv").empty
+    assert "actors" not in set(pd.read_csv(lonely.parent / "summary.csv").division)
 
 
 def test_a_class_in_neither_target_nor_prediction_is_a_dash_and_empty(lonely):
-    classes = pd.read_csv(lonely.parent / "classes.csv").set_index("class")
-    absent = [name for name in CLASS_NAMES if pd.isna(classes.iou[name])]
+    scores = pd.read_csv(lonely.parent / "scores.csv")
+    classes = scores[(scores.metric == "iou") & (scores.division == "all")].set_index("column")
+    absent = [name for name in CLASS_NAMES if pd.isna(classes.value[name])]
     assert absent
     assert (classes.cells[absent] == 0).all()
     assert "\N{EN DASH}" in _read(lonely).text
@@ -233,7 +234,7 @@ def test_zero_windows(tmp_path):
 def test_a_damaged_result_fails_its_row_and_the_rest_goes_on(troubled):
     text = _read(troubled).text
     assert "row BL-Fuse" in text
-    assert "/counts.npz" in text
+    assert "/sums.npz" in text
     assert "has the highest mean class IoU" in text
 
 

@@ -1,43 +1,57 @@
 import numpy as np
+import pytest
 
-from semgrid_eval.classes import CLASS_NAMES, UNKNOWN, category_members
-from semgrid_eval.report.estimates.bootstrap import CATEGORY_COLUMNS, MERGED_COLUMNS, score_rows
+from semgrid_eval.report.estimates.bootstrap import score_all
+from semgrid_eval.report.estimates.resampling import Resampling
+from semgrid_eval.report.estimates.table import divisions
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables.long import category_table, class_table, members, target_cells
+from semgrid_eval.report.tables.long import SEED_COLUMNS, SUMMARY_COLUMNS, division_records, seed_frame, summary_frame
+from semgrid_eval.scores.metrics.table import METRICS
+from semgrid_eval.scores.regions.table import PARTITIONS
+from semgrid_eval.scores.tidy import load_figures
 
 
-def _scores(run):
-    return list(score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=2).values())
+@pytest.fixture(scope="module")
+def everything(run):
+    runs = load_runs([run])
+    return score_all(runs[0].rows, divisions(runs), Resampling(0, draws=20))
 
 
-def test_there_is_a_line_for_each_row_seed_and_class(run):
-    table = class_table(_scores(run))
-    assert list(table.columns) == ["row", "experiment", "model", "class", "iou", "windows", "cells", "seed"]
-    assert len(table) == (4 + 3 + 2) * len(CLASS_NAMES)
-    assert sorted(table[(table.experiment == "DC") & (table.model == "ED")].seed.unique()) == [0, 1, 2]
-    assert table[table.model == "BL"].seed.isna().all()
-    assert not table.duplicated(["row", "class", "seed"]).any()
+def test_there_is_a_line_for_each_row_seed_region_and_figure(run, everything):
+    """The long table says what the run itself says, without a report."""
+    table = seed_frame(everything)
+    assert tuple(table.columns) == SEED_COLUMNS
+    keys = ["row", "seed", "metric", "division", "region", "column"]
+    assert not table.duplicated(keys).any()
+    theirs = load_figures(run).rename(columns={"partition": "division"}).set_index(keys)
+    mine = table.set_index(keys)
+    there = theirs.loc[mine.index]
+    np.testing.assert_allclose(mine.value.astype(float), there.value)
+    np.testing.assert_array_equal(mine.cells, there.cells)
+    assert theirs.drop(mine.index).value.isna().all()  # regions that a row never met
 
 
-def test_there_is_a_line_for_each_row_seed_and_category(run):
-    table = category_table(_scores(run))
-    assert list(table.columns) == ["row", "experiment", "model", "category", "iou", "windows", "cells", "seed"]
-    assert list(table.category.unique()) == [*CATEGORY_COLUMNS, *MERGED_COLUMNS]
-    assert (table.windows == 16).all()
+def test_each_figure_has_its_interval_and_its_difference_to_the_baseline(everything):
+    table = summary_frame(division_records(everything))
+    assert tuple(table.columns) == SUMMARY_COLUMNS
+    figures = table.set_index(["metric", "division", "region", "row", "column"])
+    gap = figures.loc[("iou", "actors", "moving", "ED-DC", "vehicles")]
+    entry, other = (everything["iou"]["actors"]["moving"][name] for name in ("ED-DC", "BL-DC"))
+    assert gap.reference == "BL-DC"
+    assert gap.difference == pytest.approx(entry.minus(other, "vehicles").value)
+    assert gap.difference_low == pytest.approx(entry.minus(other, "vehicles").low)
+    assert (gap.windows, gap.seeds) == (entry.windows, 3)
+    assert set(table.metric) == set(METRICS)
+    assert set(table.division) == set(PARTITIONS)  # this run knows no paces
 
 
-def test_cells_are_those_of_the_target_outside_the_mask(run):
-    row = load_runs([run])[0].rows[0]
-    with np.load(run / "windows" / f"{row.results[0].record.windows_id}.npz") as arrays:
-        target, mask = arrays["target"], arrays["mask"]
-    got = target_cells(row.results[0].counts)
-    for index, name in enumerate(CLASS_NAMES):
-        assert got[name] == np.sum((target == index) & ~mask)
-    assert got["vehicles"] == got["car"] + got["large_vehicle"]
-    assert got["mean_known"] == np.sum(~mask) - got["unknown"]
+def test_absent_numbers_are_null(everything):
+    records = division_records(everything)["iou"]["all"]["all"]["BL-DC"]
+    assert records["reference"] is None
+    assert all(value is None or np.isfinite(value) for each in records["scores"].values() for value in each.values())
 
 
-def test_members_agree_with_the_categories():
-    assert members()["static"] == category_members()["static"]
-    assert UNKNOWN not in members()["static_known"] + members()["mean_known"]
-    assert members()["merged_vehicles"] == members()["vehicles"]
+def test_without_rows_the_tables_are_empty():
+    nothing = {"iou": {"all": {}}}
+    assert seed_frame(nothing).empty
+    assert summary_frame(division_records(nothing)).empty

@@ -6,7 +6,7 @@ from semgrid_eval.report.claims.paper import paper_table
 from semgrid_eval.report.estimates.bootstrap import CATEGORY_COLUMNS, score_rows
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables import scores as tables
-from semgrid_eval.scores.iou import category_iou, class_iou
+from semgrid_eval.scores.metrics.iou import category_iou, class_iou
 
 
 @pytest.fixture(scope="module")
@@ -14,39 +14,37 @@ def scores(run):
     return score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=50)
 
 
+def shown(scores):
+    return tables.score_tables(scores, [""])
+
+
 def _body(table, name):
     return next(body for body in table.bodies if body[0].header == name)
 
 
 def test_a_row_of_the_paper_stands_above_its_values_and_the_difference(scores):
-    value, paper, difference = _body(tables.class_values(scores), "ED-DC")
+    value, paper, difference = _body(shown(scores)["classes"], "ED-DC")
     car = CLASS_NAMES.index("car")
     assert paper.cells[car].text == "0.610"
     assert value.cells[car].sort - paper.cells[car].sort == pytest.approx(difference.cells[car].sort)
 
 
 def test_a_row_that_the_paper_lacks_stands_alone(scores):
-    assert len(_body(tables.category_values(scores), "BL-Fuse")) == 1
+    assert len(_body(shown(scores)["categories"], "BL-Fuse")) == 1
     assert "BL-Fuse" not in paper_table()
 
 
 def test_the_best_of_each_column_is_marked(scores):
-    table = tables.category_values(scores)
+    table = shown(scores)["categories"]
     for at in range(len(CATEGORY_COLUMNS)):
         values = {body[0].cells[at].sort: body[0].cells[at].tone for body in table.bodies}
         assert [value for value, tone in values.items() if tone == "best"] == [max(values)]
 
 
 def test_a_number_tells_what_stands_behind_it(scores):
-    title = _body(tables.class_values(scores), "ED-DC")[0].cells[CLASS_NAMES.index("car")].title
+    title = _body(shown(scores)["classes"], "ED-DC")[0].cells[CLASS_NAMES.index("car")].title
     for words in ("target cells", "16 windows", "3 seeds", "95% interval"):
         assert words in title
-
-
-def test_differences_are_marked_where_they_are_sure(scores):
-    table = tables.difference_table("differences", scores, ("vehicles",))
-    assert [body[0].header for body in table.bodies] == ["ED-DC \N{MINUS SIGN} BL-DC", "ED-Sp2 \N{MINUS SIGN} BL-Sp2"]
-    assert table.bodies[0][0].cells[0].tone == "gain"
 
 
 def test_means_over_windows_are_means_of_each_windows_scores(scores):
@@ -63,8 +61,3 @@ def test_confusions_are_shares_of_the_targets_cells(scores):
     for line, target in zip(table.bodies, counts, strict=True):
         if target.sum():
             assert [cell.sort for cell in line[0].cells] == pytest.approx(target / target.sum())
-
-
-@pytest.mark.parametrize(("count", "text"), [(999, "999"), (9999, "9,999"), (31_533, "31.5 k"), (4_586_444, "4.59 M")])
-def test_large_counts_are_short(count, text):
-    assert tables._short_count(count) == text

@@ -1,15 +1,12 @@
-import re
-
 import numpy as np
 import pandas as pd
 import pytest
-from support.fake_run import HOSTILE
 
 from semgrid_eval.files import read_json
 from semgrid_eval.report.claims.paper import paper_table
 from semgrid_eval.report.estimates.bootstrap import COLUMNS, score_rows
+from semgrid_eval.report.page.write import write_report
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables.write import latex_table, markdown_table
 
 
 @pytest.fixture(scope="module")
@@ -17,36 +14,21 @@ def scores(run):
     return score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=5)
 
 
-def test_markdown_has_a_line_for_each_row(scores):
-    lines = markdown_table(scores).splitlines()
-    assert len(lines) == 2 + len(scores)
-    assert len({line.count("|") for line in lines}) == 1
-    assert f"{scores['ED-DC'].mean['vehicles']:.3f}" in next(line for line in lines if "ED-DC" in line)
-
-
-def test_markdown_and_latex_escape_names(scores):
-    odd = {"a|b_c & 5%\n$x$": scores["BL-DC"]}
-    assert r"| a\|b\_c \& 5% \$x\$ |" in markdown_table(odd)
-    assert r"a\textbar{}b\_c \& 5\% \$x\$ &" in latex_table(odd)
-    assert latex_table(odd).splitlines()[-1] == r"\end{tabular}"
-
-
-@pytest.mark.parametrize("name", [*HOSTILE, "[2pt] first", "* star", "\x1b[0m", "&lt;", "~~gone~~", "\u9053\u8def"])
-def test_a_name_stays_one_cell_of_one_line(scores, name):
-    tables = markdown_table({name: scores["BL-DC"]}), latex_table({name: scores["BL-DC"]})
-    plain = markdown_table({"x": scores["BL-DC"]}), latex_table({"x": scores["BL-DC"]})
-    assert [table.count("\n") for table in tables] == [table.count("\n") for table in plain]
-    markdown, latex = (table.splitlines()[at] for table, at in zip(tables, (2, 4), strict=True))
-    assert re.sub(r"\\.", "", markdown).count("|") == plain[0].splitlines()[2].count("|")
-    left = re.sub(r"\\(?:text\w+\{\}|.)|\{\[\}|\{\*\}", "", latex.split(" & ")[0])
-    assert not set(left) & set('&%$#_{}~^\\<>|"[*')
-
-
 def test_the_summary_has_every_row_and_score(page, scores):
     table = pd.read_csv(page.parent / "summary.csv")
-    assert len(table) == len(scores) * len(COLUMNS)
+    assert len(table[(table.metric == "iou") & (table.division == "all")]) == len(scores) * len(COLUMNS)
     known = table[np.isfinite(table.low)]
     assert (known.low <= known.high).all()
+
+
+def test_every_table_of_the_page_is_there_in_every_format(page):
+    text = page.read_text()
+    names = {path.stem for path in (page.parent / "tables").iterdir()}
+    assert {"categories", "differences", "classes", "actors", "distance-differences", "costs"} <= names
+    for name in names:
+        assert f'id="table-{name}"' in text
+        assert {path.suffix for path in (page.parent / "tables").glob(f"{name}.*")} == {".csv", ".json", ".md", ".tex"}
+    assert (page.parent / "summary.md").read_text() == (page.parent / "tables" / "categories.md").read_text()
 
 
 def test_the_record_for_machines_has_scores_differences_and_failures(page):
@@ -88,12 +70,20 @@ def test_findings_and_regions_are_there_for_machines(page):
     record = read_json(page.parent / "report.json")
     finding = next(each for each in record["findings"] if each["name"] == "moving-BL-DC")
     (check,) = finding["checks"]
-    ours = record["regions"]["moving"]["ED-DC"]["differences"]["vehicles"]
+    ours = record["metrics"]["iou"]["actors"]["moving"]["ED-DC"]["differences"]["vehicles"]
     assert {"value": check["difference"], "low": check["low"], "high": check["high"]} == ours
     assert next(each for each in record["findings"] if each["verdict"] == "not run")["checks"][0]["low"] is None
-    table = pd.read_csv(page.parent / "regions.csv")
-    line = table[(table.region == "moving") & (table.row == "ED-DC") & (table.score == "vehicles")]
-    assert line.difference.item() == pytest.approx(ours["value"], abs=1e-6)
+    table = pd.read_csv(page.parent / "summary.csv").set_index(["metric", "division", "region", "row", "column"])
+    line = table.loc[("iou", "actors", "moving", "ED-DC", "vehicles")]
+    assert line.difference == pytest.approx(ours["value"], abs=1e-6)
+
+
+def test_the_level_of_resampling_is_told_with_its_reason(run, tmp_path):
+    grouped = write_report(run, tmp_path / "report", resample="groups")
+    interval = read_json(grouped.parent / "report.json")["interval"]
+    assert interval["over"] == "groups"
+    assert "may depend on each other" in interval["why"]
+    assert interval["why"] in grouped.read_text()
 
 
 def test_the_papers_table_is_complete():

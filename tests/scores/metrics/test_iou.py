@@ -2,23 +2,23 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from sklearn.metrics import confusion_matrix, jaccard_score
 
-from semgrid_eval.classes import CATEGORY_NAMES, CLASS_COUNT, CLASS_NAMES, category_members
-from semgrid_eval.scores.iou import (
-    averaged_members,
-    category_iou,
-    class_iou,
-    confusion,
-    mean_finite,
-    merged_category_iou,
-)
+from semgrid_eval.classes import CATEGORY_NAMES, CLASS_COUNT, CLASS_NAMES, UNKNOWN, category_members
+from semgrid_eval.scores.metrics.iou import averaged_members, category_iou, class_iou, confusion
+from semgrid_eval.scores.metrics.metric import mean_finite
+from semgrid_eval.scores.metrics.table import IOU
 
 
 def random_grids(seed, shape=(3, 7, 9), classes=CLASS_COUNT):
     rng = np.random.default_rng(seed)
     target, prediction = rng.integers(0, classes, (2, *shape), dtype=np.uint8)
     return target, prediction, rng.random(shape) < 0.3
+
+
+def figures(counts):
+    return dict(zip([column.name for column in IOU.columns], IOU.figures(IOU.ratios(counts)), strict=True))
 
 
 def slow_iou(target, prediction, mask, class_id):
@@ -95,15 +95,54 @@ def test_a_mean_leaves_out_what_is_absent_along_either_axis():
 
 def test_merged_categories_do_not_punish_confusion_within_one():
     target, prediction, mask = random_grids(5)
-    merged = merged_category_iou(confusion(target, prediction, mask).sum(axis=0))
+    merged = figures(confusion(target, prediction, mask).sum(axis=0))
     category_of = np.zeros(CLASS_COUNT, np.uint8)
     for number, classes in enumerate(category_members().values()):
         category_of[list(classes)] = number
     for number, name in enumerate(CATEGORY_NAMES):
         slow = slow_iou(category_of[target], category_of[prediction], mask, number)
-        assert merged[name] == pytest.approx(slow)
+        assert merged[f"merged_{name}"] == pytest.approx(slow)
 
 
 def test_shapes_that_differ_are_refused():
     with pytest.raises(ValueError, match="shapes differ"):
         confusion(np.zeros((1, 2, 2), np.uint8), np.zeros((1, 2, 3), np.uint8), np.zeros((1, 2, 2), bool))
+
+
+COUNTS = arrays(np.int64, (CLASS_COUNT, CLASS_COUNT), elements=st.integers(0, 50))
+
+
+def slow_of_counts(counts, ids):
+    hits = sum(int(counts[i, j]) for i in ids for j in ids)
+    inside = sum(int(counts[i, j]) for i in range(CLASS_COUNT) for j in range(CLASS_COUNT) if i in ids or j in ids)
+    return hits / inside if inside else float("nan")
+
+
+@given(COUNTS)
+def test_figures_are_class_ious_means_of_categories_and_merged_categories(counts):
+    got = figures(counts)
+    classes = [slow_of_counts(counts, {i}) for i in range(CLASS_COUNT)]
+    known = [v for i, v in enumerate(classes) if i != UNKNOWN and v == v]
+    np.testing.assert_allclose([got[name] for name in CLASS_NAMES], classes)
+    np.testing.assert_allclose(got["mean_known"], np.mean(known) if known else np.nan)
+    for name, ids in category_members().items():
+        present = [classes[i] for i in ids if classes[i] == classes[i]]
+        np.testing.assert_allclose(got[name], np.mean(present) if present else np.nan)
+        np.testing.assert_allclose(got[f"merged_{name}"], slow_of_counts(counts, set(ids)))
+    static = set(category_members()["static"]) - {UNKNOWN}
+    np.testing.assert_allclose(got["merged_static_known"], slow_of_counts(counts, static))
+
+
+@given(arrays(np.int64, (3, CLASS_COUNT, CLASS_COUNT), elements=st.integers(0, 50)))
+def test_ratios_can_be_summed_like_counts(counts):
+    np.testing.assert_array_equal(IOU.ratios(counts).sum(axis=0), IOU.ratios(counts.sum(axis=0)))
+
+
+def test_cells_are_those_of_the_target_outside_the_mask():
+    target, prediction, mask = random_grids(3)
+    counts = confusion(target, prediction, mask).sum(axis=0)
+    got = dict(zip([column.name for column in IOU.columns], IOU.cells(counts).tolist(), strict=True))
+    for index, name in enumerate(CLASS_NAMES):
+        assert got[name] == np.sum((target == index) & ~mask)
+    assert got["vehicles"] == got["merged_vehicles"] == got["car"] + got["large_vehicle"]
+    assert got["mean_known"] == np.sum(~mask) - got["unknown"]

@@ -1,25 +1,18 @@
 """Scores by speed: every window belongs to the pace that the vehicle really drove."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from support.fake_run import FRAME_NS, FakeRow, make_fake_run
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.report.estimates.bootstrap import score_rows
-from semgrid_eval.report.page.write import write_report
+from semgrid_eval.report.estimates.bootstrap import score_regions, score_rows
+from semgrid_eval.report.estimates.paces import PACES, mean_speed_mps, paces
+from semgrid_eval.report.estimates.resampling import Resampling
+from semgrid_eval.report.page.write import rows_without, write_report
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables.pace import (
-    PACES,
-    mean_speed_mps,
-    pace_frame,
-    pace_tables,
-    rows_without_pace,
-    score_paces,
-)
-from semgrid_eval.scores.iou import class_iou
+from semgrid_eval.scores.metrics.iou import class_iou
+from semgrid_eval.scores.metrics.table import IOU, METRICS
 from semgrid_eval.scores.thumbnails import LogPictures, Track, pictures_file, write_pictures
 
 ROWS = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 2))
@@ -46,8 +39,8 @@ def runs(tmp_path_factory):
     return made(tmp_path_factory.mktemp("paces"), [track(speed) for speed in SPEEDS_MPS])
 
 
-def scored(runs):
-    return score_paces(runs, runs[0].rows, 0)
+def scored(runs, metric=IOU):
+    return score_regions(runs[0].rows, metric, paces(runs), Resampling(0))
 
 
 def test_speed_is_the_straight_way_over_the_time():
@@ -57,63 +50,49 @@ def test_speed_is_the_straight_way_over_the_time():
 
 
 def test_each_window_counts_at_its_own_pace(runs):
-    paces = scored(runs)
-    assert list(paces) == list(PACES)
+    found = scored(runs)
+    assert list(found) == list(PACES)
     counts = runs[0].rows[0].results[0].counts.astype(np.int64)
     for name, at in zip(PACES, ([0], [1], [2, 4], [3]), strict=True):
-        entry = paces[name]["BL-DC"]
-        assert entry.row.windows == len(at)
+        entry = found[name]["BL-DC"]
+        assert entry.windows == len(at)
         assert entry.mean["road"] == pytest.approx(class_iou(counts[at].sum(axis=0))[1])
 
 
-def test_seeds_and_differences_are_those_of_the_same_windows(runs):
-    table = pace_frame(scored(runs)).set_index(["pace", "row", "score"])
-    line = table.loc[("4 to 8 m/s", "ED-DC", "static_known")]
-    assert (line.reference, line.seeds, line.windows) == ("BL-DC", 2, 2)
-    chosen = {
-        window.recording for row in scored(runs)["4 to 8 m/s"].values() for window in row.row.results[0].record.windows
-    }
-    assert chosen == {"town_002", "town_004"}
-    baseline = table.loc[("4 to 8 m/s", "BL-DC", "static_known")]
-    assert line.difference == pytest.approx(line.iou - baseline.iou)
+def test_differences_are_those_of_the_same_windows(runs):
+    scores = scored(runs)["4 to 8 m/s"]
+    mine, other = scores["ED-DC"], scores["BL-DC"]
+    assert (len(mine.results), mine.windows) == (2, 2)
+    difference = mine.minus(other, "static_known")
+    assert difference.value == pytest.approx(mine.mean["static_known"] - other.mean["static_known"])
     whole = score_rows(runs[0].rows, np.random.default_rng(0))
-    assert line.iou != pytest.approx(whole["ED-DC"].mean["static_known"])
+    assert mine.mean["static_known"] != pytest.approx(whole["ED-DC"].mean["static_known"])
 
 
-def test_tables_have_a_column_for_each_pace_and_score(runs):
-    tables = pace_tables(scored(runs))
-    notes = [note for _, note in tables["paces"].columns]
-    assert [note.partition(",")[0] for note in notes] == [name for name in PACES for _ in range(2)]
-    assert len(tables["pace_differences"].bodies) == 1
+def test_every_metric_can_be_divided_by_pace(runs):
+    whole = {name: score_regions(runs[0].rows, m, paces(runs), Resampling(0)) for name, m in METRICS.items()}
+    totals = {name: sum(parts[pace]["ED-DC"].totals for pace in PACES) for name, parts in whole.items()}
+    result = runs[0].rows[1].results[0]
+    for name, total in totals.items():
+        np.testing.assert_array_equal(total[0], result.read(name, "all").sum(axis=(0, 1)))
 
 
 @pytest.mark.parametrize("tracks", [[], [track(3.0, frames=0)] * 2], ids=["none kept", "no frame"])
 def test_a_run_that_knows_no_drive_says_so(tmp_path, tracks):
     runs = made(tmp_path, tracks)
     assert scored(runs) == {}
-    assert set(pace_tables({}).values()) == {None}
     page = write_report(tmp_path / "run")
     assert "No result here tells how its vehicle drove" in page.read_text()
-    assert (page.parent / "paces.csv").read_text().count("\n") == 1
+    assert "paces" not in (page.parent / "summary.csv").read_text()
 
 
 def test_a_log_whose_drive_is_unknown_is_left_out(tmp_path):
-    paces = scored(made(tmp_path, [track(6.0), track(6.0)]))
-    assert list(paces) == ["4 to 8 m/s"]
-    assert paces["4 to 8 m/s"]["BL-DC"].row.windows == 2
-
-
-def test_results_of_older_versions_do_not_hide_newer_ones(runs):
-    (run,) = runs
-    older = run.rows[0].results[0]
-    untimed = tuple(window.model_copy(update={"input_stamps_ns": ()}) for window in older.record.windows)
-    record = older.record.model_copy(
-        update={"windows": untimed, "windows_id": run.rows[1].results[0].record.windows_id}
-    )
-    rows = [replace(run.rows[0], results=(replace(older, record=record),)), run.rows[1]]
-    paces = score_paces(runs, rows, 0)
-    assert [list(scores) for scores in paces.values()] == [["ED-DC"]] * len(PACES)
-    assert rows_without_pace(rows, paces) == ["BL-DC"]
+    runs = made(tmp_path, [track(6.0), track(6.0)])
+    found = scored(runs)
+    assert list(found) == ["4 to 8 m/s"]
+    assert found["4 to 8 m/s"]["BL-DC"].windows == 2
+    assert rows_without(found, runs[0].rows) == []
+    assert rows_without({}, runs[0].rows) == ["BL-DC", "ED-DC"]
 
 
 def test_a_run_with_pictures_shows_its_paces(seen_page):

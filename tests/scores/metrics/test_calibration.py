@@ -10,21 +10,49 @@ from hypothesis.extra.numpy import arrays
 from sklearn.calibration import calibration_curve
 
 from semgrid_eval.classes import UNKNOWN
-from semgrid_eval.scores.calibration import certainty_counts, expected_calibration_error, reliability
+from semgrid_eval.grids.spec import GridSpec
+from semgrid_eval.scores.metrics.calibration import Calibration
+from semgrid_eval.scores.metrics.metric import Regions, ScoredWindows
 
 SHAPE = (2, 3, 4)
 GRIDS = arrays(np.uint8, SHAPE, elements=st.integers(0, 3))
 COUNTS = arrays(np.int64, (256, 2), elements=st.integers(0, 9), fill=st.just(0))
 
 
+def counted(target, prediction, certainty, mask, metric):
+    """The sums (bins, 3) of all windows, outside the mask."""
+    inputs = np.zeros((len(target), 1, 1, *target.shape[1:]), np.uint8)
+    scored = ScoredWindows(target, prediction, certainty, mask, inputs, None, GridSpec())
+    return metric.count(scored, Regions(np.where(mask, -1, 0), 1)).sum(axis=(0, 1))
+
+
+def of_levels(counts, bins):
+    """The metric and its sums for wrong and right cells of each level: (256, 2)."""
+    metric, levels = Calibration(bins), np.repeat(np.arange(256), counts.sum(axis=1)).astype(np.uint8)
+    right = np.concatenate([[0] * wrong + [1] * hits for wrong, hits in counts.tolist()]).astype(np.uint8)
+    grids = (grid.reshape(1, 1, -1) for grid in (np.full_like(levels, 1), 2 - right, levels))
+    return metric, counted(*grids, np.zeros((1, 1, len(levels)), bool), metric)
+
+
+def reliability(counts, bins=10):
+    metric, sums = of_levels(counts, bins)
+    return metric.reliability(metric.ratios(sums))
+
+
+def expected_calibration_error(counts, bins=10):
+    metric, sums = of_levels(counts, bins)
+    return metric.figures(metric.ratios(sums))[0]
+
+
 @settings(max_examples=40)
 @given(GRIDS, GRIDS, arrays(np.uint8, SHAPE), arrays(np.bool_, SHAPE))
-def test_certainty_is_counted_of_cells_outside_the_mask_that_are_predicted_known(target, prediction, certainty, mask):
-    expected = np.zeros((256, 2), int)
+def test_cells_outside_the_mask_that_are_predicted_known_count(target, prediction, certainty, mask):
+    expected = np.zeros((5, 3), int)
     for at in np.ndindex(SHAPE):
         if not mask[at] and prediction[at] != UNKNOWN:
-            expected[certainty[at], int(target[at] == prediction[at])] += 1
-    np.testing.assert_array_equal(certainty_counts(target, prediction, certainty, mask), expected)
+            level = int(certainty[at])
+            expected[min(level * 5 // 255, 4)] += (1, target[at] == prediction[at], level)
+    np.testing.assert_array_equal(counted(target, prediction, certainty, mask, Calibration(5)), expected)
 
 
 def slow_bins(counts, bins):
@@ -82,4 +110,14 @@ def test_who_is_as_often_right_as_it_is_certain_has_no_error():
     prediction = random.integers(0, 3, shape).astype(np.uint8)  # a third of the cells unknown
     is_right = random.random(shape) < certainty / 255
     target = np.where(is_right, prediction, (prediction + random.integers(1, 3, shape)) % 3).astype(np.uint8)
-    assert expected_calibration_error(certainty_counts(target, prediction, certainty, np.zeros(shape, bool))) < 0.005
+    metric = Calibration()
+    figures = metric.figures(metric.ratios(counted(target, prediction, certainty, np.zeros(shape, bool), metric)))
+    error, precision, mean = figures.tolist()
+    assert error < 0.005
+    assert precision == pytest.approx(is_right[prediction != UNKNOWN].mean())
+    assert mean == pytest.approx(certainty[prediction != UNKNOWN].mean() / 255)
+
+
+def test_ratios_can_be_summed_like_counts():
+    metric, sums = Calibration(), np.random.default_rng(1).integers(0, 99, (4, 10, 3))
+    np.testing.assert_array_equal(metric.ratios(sums).sum(axis=0), metric.ratios(sums.sum(axis=0)))

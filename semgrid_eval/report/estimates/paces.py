@@ -1,0 +1,50 @@
+"""Windows by how fast the vehicle drives between the newest input and the target.
+
+Who stands needs no alignment, who drives fast needs it most: whether a model has learned the motion shows here.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.report.estimates.division import Division, of_windows
+from semgrid_eval.report.examples.kept import Glimpses
+from semgrid_eval.report.rows.load import Result, Row, Run
+from semgrid_eval.scores.thumbnails import Track
+
+EDGES_MPS = (0.5, 4.0, 8.0)
+"""Speeds between the paces; below the first a vehicle stands."""
+PACES = ("standing", "below 4 m/s", "4 to 8 m/s", "above 8 m/s")
+_WORDS = "by the vehicle's speed from newest input to target"
+
+
+def paces(runs: Sequence[Run]) -> Division:
+    """Divide windows by pace, as far as runs kept what they know of their logs."""
+    kept = {run.folder: Glimpses(run) for run in runs}
+    shared: dict[tuple[Path, str], NDArray[np.int64]] = {}
+
+    def number(row: Row, result: Result) -> NDArray[np.int64]:
+        key = (row.run, result.record.windows_id)
+        if key not in shared:
+            shared[key] = _paces(result, kept[row.run])
+        return shared[key]
+
+    return of_windows("paces", PACES, _WORDS, {"iou": ("static_known", "vehicles")}, number)
+
+
+def mean_speed_mps(track: Track, from_ns: int, to_ns: int) -> float:
+    """Return the speed at which the straight way between two times is driven."""
+    x_m, y_m = (np.interp([from_ns, to_ns], track.stamps_ns, track.poses[:, axis]) for axis in (0, 1))
+    return float(np.hypot(x_m[1] - x_m[0], y_m[1] - y_m[0]) / ((to_ns - from_ns) * 1e-9))
+
+
+def _paces(result: Result, kept: Glimpses) -> NDArray[np.int64]:
+    """Number the pace of each window: (N,), -1 where nothing is known of the drive."""
+    found = np.full(len(result.record.windows), -1, np.int64)
+    for i, window in enumerate(result.record.windows):
+        track, newest_ns = kept.track(window.log, result), max(window.input_stamps_ns, default=window.target_stamp_ns)
+        if track is not None and len(track.stamps_ns) and newest_ns < window.target_stamp_ns:
+            found[i] = np.digitize(mean_speed_mps(track, newest_ns, window.target_stamp_ns), EDGES_MPS)
+    return found

@@ -1,0 +1,181 @@
+"""Tables of scores: rows beside each other with the best marked, and differences to their baselines."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from semgrid_eval.report.claims.paper import paper_table
+from semgrid_eval.report.estimates.bootstrap import Estimate, Parts, RowScores, Scores, comparable
+from semgrid_eval.report.rows.pairing import reference_of, verdict
+from semgrid_eval.report.tables.table import (
+    ABSENT,
+    Cell,
+    Line,
+    Table,
+    difference_cell,
+    finite,
+    interval_phrase,
+    number,
+    plain_cell,
+    plural,
+    signed,
+    value_cell,
+)
+from semgrid_eval.scores.metrics.metric import column_of
+
+_OTHER_TARGETS = " Rows whose targets differ (frames, grids, mask mode or split) are not compared with each other."
+
+
+def value_table(
+    name: str, caption: str, scores: Scores, columns: Sequence[str], *, beside_paper: bool = False
+) -> Table:
+    """Show the columns of every row, the best of each marked, beside the paper's values where it has them."""
+    best = {column: best_rows(scores, column) for column in columns}
+    bodies = tuple(_value_body(entry, best, beside_paper=beside_paper) for entry in scores.values())
+    return Table(name, caption + targets_note(scores), "Row", _headers(scores, columns), bodies)
+
+
+def difference_table(name: str, caption: str, scores: Scores, columns: Sequence[str]) -> Table | None:
+    """Show each row's paired difference to its baseline; None where no row has one."""
+    pairs = ((entry, reference_scores(entry, scores)) for entry in scores.values())
+    return _differences(name, caption, [(entry, other) for entry, other in pairs if other is not None], columns)
+
+
+def run_differences(name: str, caption: str, scores: Scores, columns: Sequence[str]) -> Table | None:
+    """Show, for rows of one name in several runs, the difference of each later run to the first on the same targets."""
+    first: dict[tuple[str, str], RowScores] = {}
+    for entry in scores.values():
+        first.setdefault((entry.row.record.name, entry.row.targets), entry)
+    pairs = [(entry, first[entry.row.record.name, entry.row.targets]) for entry in scores.values()]
+    return _differences(name, caption, [(entry, other) for entry, other in pairs if entry is not other], columns)
+
+
+def part_values(name: str, caption: str, parts: Parts, columns: Sequence[str]) -> Table | None:
+    """Show the scores of all regions beside each other; None where there are none."""
+    return _side_by_side(
+        name, caption, {part: value_table("", "", scores, columns) for part, scores in parts.items()}, len(columns)
+    )
+
+
+def part_differences(name: str, caption: str, parts: Parts, columns: Sequence[str]) -> Table | None:
+    """Show rows' paired differences to their baselines alike."""
+    tables = {part: difference_table("", "", scores, columns) for part, scores in parts.items()}
+    return _side_by_side(name, caption, {part: table for part, table in tables.items() if table}, len(columns))
+
+
+def reference_scores(entry: RowScores, scores: Scores) -> RowScores | None:
+    """Find the scores of the baseline that a row is measured against, None where it has none on the same targets."""
+    reference = reference_of(entry.row, [other.row for other in scores.values()])
+    return scores[reference.name] if reference is not None and comparable(entry.row, reference) else None
+
+
+def best_rows(scores: Scores, column: str) -> set[str]:
+    """Name the rows that are the best of those on the same targets; none is where it stands alone among others."""
+    groups: dict[str, list[str]] = {}
+    for name, entry in scores.items():
+        groups.setdefault(entry.row.targets, []).append(name)
+    best: set[str] = set()
+    for names in groups.values():
+        values = {name: _worth(scores[name], column) for name in names}
+        top = max((value for value in values.values() if np.isfinite(value)), default=None)
+        if len(names) > 1 or len(groups) == 1:
+            best |= {name for name, value in values.items() if value == top}
+    return best
+
+
+def targets_note(scores: Scores) -> str:
+    """Say that not all rows can be compared, where that is so."""
+    return _OTHER_TARGETS if len({entry.row.targets for entry in scores.values()}) > 1 else ""
+
+
+def evidence(entry: RowScores, column: str) -> str:
+    """Say what stands behind a number, for its tooltip."""
+    parts = [
+        f"{entry.row.name}, {column_of(entry.metric, column).label}: {number(entry.mean[column])}",
+        plural(entry.cells[column], "target cell"),
+        plural(entry.windows, "window"),
+        seeds(entry),
+        interval_phrase(entry.estimate(column)),
+    ]
+    return "; ".join(parts)
+
+
+def seeds(entry: RowScores) -> str:
+    """Count the seeds behind a row."""
+    return plural(len(entry.results), "seed") if entry.results[0].record.seed is not None else "no chance involved"
+
+
+def short_count(count: int) -> str:
+    """Write a count with three digits."""
+    for unit, size in (("M", 10**6), ("k", 10**4)):
+        if count >= size:
+            return f"{count / (10**6 if unit == 'M' else 10**3):.3g} {unit}"
+    return f"{count:,}"
+
+
+def _worth(entry: RowScores, column: str) -> float:
+    """Return a value that is the larger the better; NaN where none is better than another."""
+    return entry.mean[column] * {"higher": 1.0, "lower": -1.0, "": np.nan}[column_of(entry.metric, column).better]
+
+
+def _value_body(entry: RowScores, best: Mapping[str, set[str]], *, beside_paper: bool) -> tuple[Line, ...]:
+    values = tuple(
+        value_cell(entry.estimate(name), title=evidence(entry, name), best=entry.row.name in rows)
+        for name, rows in best.items()
+    )
+    lines = [Line(entry.row.name, values, title=entry.row.record.label)]
+    paper = paper_table().get(entry.row.record.name, {}) if beside_paper else {}
+    if set(best) <= set(paper):
+        source = f"the paper's {entry.row.record.name}, Table A1: mean over 20 seeds, Cityscapes"
+        lines.append(Line("paper", tuple(plain_cell(paper[name], title=source) for name in best), "paper"))
+        lines.append(Line("difference", tuple(_paper_gap(entry, name, paper[name]) for name in best), "paper"))
+    return tuple(lines)
+
+
+def _paper_gap(entry: RowScores, column: str, paper: float) -> Cell:
+    """Show the difference to the paper's value, of which no interval is known: the row's own, moved by it."""
+    mine = entry.estimate(column)
+    gap = Estimate(mine.value - paper, mine.low - paper, mine.high - paper)
+    title = f"{evidence(entry, column)}; less the paper's {number(paper)}: {interval_phrase(gap, with_sign=True)}"
+    return Cell(signed(gap.value), finite(gap.value), title=title, tone=verdict(gap))
+
+
+def _differences(
+    name: str, caption: str, pairs: Sequence[tuple[RowScores, RowScores]], columns: Sequence[str]
+) -> Table | None:
+    bodies = tuple((_difference_line(entry, other, columns),) for entry, other in pairs)
+    headers = _headers({entry.row.name: entry for entry, _ in pairs}, columns)
+    return Table(name, caption, "Rows", headers, bodies) if bodies else None
+
+
+def _difference_line(entry: RowScores, other: RowScores, columns: Sequence[str]) -> Line:
+    cells = tuple(_difference(entry, other, column) for column in columns)
+    return Line(f"{entry.row.name} \N{MINUS SIGN} {other.row.name}", cells)
+
+
+def _difference(entry: RowScores, other: RowScores, column: str) -> Cell:
+    difference = entry.minus(other, column)
+    title = f"{evidence(entry, column)}; difference: {interval_phrase(difference, with_sign=True)}"
+    return difference_cell(difference, title=title, better=column_of(entry.metric, column).better)
+
+
+def _headers(scores: Scores, columns: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    first = next(iter(scores.values()), None)
+    if first is None:
+        return ()
+    return tuple((column_of(first.metric, c).label, f"{short_count(first.cells[c])} cells") for c in columns)
+
+
+def _side_by_side(name: str, caption: str, parts: Mapping[str, Table], width: int) -> Table | None:
+    """Join tables of that many columns by the headers of their lines, with dashes where one of them lacks a line."""
+    if not parts:
+        return None
+    columns = tuple((label, f"{part}, {note}") for part, table in parts.items() for label, note in table.columns)
+    lines = {part: {body[0].header: body[0] for body in table.bodies} for part, table in parts.items()}
+    headers = dict.fromkeys(header for found in lines.values() for header in found)
+    bodies = []
+    for header in headers:
+        absent = Line(header, (Cell(ABSENT),) * width)
+        cells = tuple(cell for found in lines.values() for cell in found.get(header, absent).cells)
+        bodies.append((Line(header, cells),))
+    return Table(name, caption, next(iter(parts.values())).corner, columns, tuple(bodies))

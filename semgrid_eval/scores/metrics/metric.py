@@ -1,0 +1,132 @@
+"""What a metric is, and what it sees: scored windows whose cells are divided into regions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.grids.spec import GridSpec
+
+Counts = NDArray[np.int64]
+Floats = NDArray[np.float64]
+Grid = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class ScoredWindows:
+    """N windows and what a model says of them.
+
+    Args:
+        target: (N, H, W) class ids.
+        prediction: (N, H, W) class ids, the mask M treated as the row asks.
+        certainty: (N, H, W) of the prediction, 255 = 1.
+        left_out: (N, H, W) bool, cells that do not count.
+        inputs: (N, S, T, H, W) class ids, oldest first, moved into the target's place.
+        actors: (N, H, W) flags of true actors, `STANDING` and `MOVING`; None where no log holds the truth.
+        spec: extent of the grids.
+    """
+
+    target: Grid
+    prediction: Grid
+    certainty: Grid
+    left_out: NDArray[np.bool_]
+    inputs: Grid
+    actors: Grid | None
+    spec: GridSpec
+
+
+@dataclass(frozen=True)
+class Regions:
+    """In which region each cell counts: `number` (N, H, W) from 0 to below `count`, -1 where it counts nowhere."""
+
+    number: NDArray[np.int64]
+    count: int
+
+    def tally(self, codes: NDArray[np.integer], size: int) -> Counts:
+        """Count cells by their code in each window and region: (N, H, W) below `size` -> (N, count, size).
+
+        Cells with a negative code are left out.
+        """
+        windows = len(codes)
+        counted = (self.number >= 0) & (codes >= 0)
+        place = np.arange(windows)[:, None, None] * self.count + self.number
+        index = (place * size + codes)[counted]
+        total = np.bincount(index, minlength=windows * self.count * size)
+        return np.asarray(total.reshape(windows, self.count, size), np.int64)
+
+
+@dataclass(frozen=True)
+class Column:
+    """One figure of a metric: its name, what it is called in words, and which of two values is the better one."""
+
+    name: str
+    label: str
+    better: Literal["higher", "lower", ""] = "higher"
+
+
+class Metric(Protocol):
+    """Whole numbers that are counted in each window and can be summed over windows, and figures that follow from them.
+
+    Sums have shape (..., *shape): of one window or many, of one region or many. Ratios have shape (..., K, 2): a
+    numerator and a denominator for each of `ratio_names`, both linear in the sums, so that they can be summed as well.
+    """
+
+    @property
+    def name(self) -> str:
+        """The name in files and columns."""
+
+    @property
+    def title(self) -> str:
+        """What its figures are, in words, at the start of a sentence."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of what is counted in one region of one window."""
+
+    @property
+    def ratio_names(self) -> Sequence[str]:
+        """The names of the K ratios."""
+
+    @property
+    def columns(self) -> Sequence[Column]:
+        """The Q figures."""
+
+    @property
+    def shown(self) -> Sequence[str]:
+        """The columns that a report shows where a partition asks for no others."""
+
+    def count(self, scored: ScoredWindows, regions: Regions) -> Counts:
+        """Count in each window and region: -> (N, regions, *shape)."""
+
+    def ratios(self, sums: Counts) -> Counts:
+        """Take numerators and denominators out of sums: (..., *shape) -> (..., K, 2)."""
+
+    def figures(self, ratios: Counts) -> Floats:
+        """Divide: (..., K, 2) -> (..., Q); NaN where there is nothing to divide by."""
+
+    def cells(self, sums: Counts) -> Counts:
+        """Count the cells that stand behind each figure: (..., *shape) -> (..., Q)."""
+
+
+def column_names(metric: Metric) -> tuple[str, ...]:
+    """Return the names of a metric's figures."""
+    return tuple(column.name for column in metric.columns)
+
+
+def column_of(metric: Metric, name: str) -> Column:
+    """Find a metric's figure by its name."""
+    return metric.columns[column_names(metric).index(name)]
+
+
+def divided(part: NDArray[np.number], whole: Counts) -> Floats:
+    """Divide, NaN where there is nothing to divide by."""
+    return np.asarray(np.divide(part, whole, out=np.full(whole.shape, np.nan), where=whole > 0))
+
+
+def mean_finite(values: Floats, *, axis: int = -1) -> Floats:
+    """Mean of the values along an axis that are there, NaN where none is."""
+    present = np.isfinite(values)
+    total = np.where(present, values, 0.0).sum(axis=axis)
+    return divided(total, present.sum(axis=axis))

@@ -1,0 +1,30 @@
+"""What a partition of cells is."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.scores.metrics.metric import ScoredWindows
+
+CellNumbers = Callable[[ScoredWindows], NDArray[np.int64] | None]
+
+
+@dataclass(frozen=True)
+class Partition:
+    """Cells of windows divided into regions.
+
+    Args:
+        name: in files and columns.
+        regions: names of the regions, as a reader sees them.
+        words: which cells the regions hold, to follow "IoU".
+        number: numbers the region of each cell (N, H, W), -1 where it is in none; None where windows do not tell.
+        shown: what a report shows of it: columns by metric; of a metric that is not named, nothing.
+    """
+
+    name: str
+    regions: Sequence[str]
+    words: str
+    number: CellNumbers
+    shown: Mapping[str, Sequence[str]] = field(default_factory=dict)

@@ -1,0 +1,10 @@
+"""The partitions of cells that every metric is counted by."""
+
+from semgrid_eval.scores.regions.actors import ACTORS
+from semgrid_eval.scores.regions.distance import DISTANCE
+from semgrid_eval.scores.regions.everywhere import EVERYWHERE
+from semgrid_eval.scores.regions.origin import ORIGIN
+from semgrid_eval.scores.regions.partition import Partition
+
+PARTITIONS: dict[str, Partition] = {each.name: each for each in (EVERYWHERE, ACTORS, DISTANCE, ORIGIN)}
+"""To add a partition, add a line here."""

@@ -1,0 +1,106 @@
+"""A run as data frames of one line for each number, made result by result."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from semgrid_eval.scores.metrics.metric import Metric, column_names
+from semgrid_eval.scores.metrics.table import METRICS
+from semgrid_eval.scores.regions.partition import Partition
+from semgrid_eval.scores.regions.table import PARTITIONS
+from semgrid_eval.scores.results import ResultRecord, read_result, read_run, read_sums, result_folder
+
+FIGURE_COLUMNS = ("row", "seed", "metric", "partition", "region", "column", "value", "cells", "windows")
+WINDOW_COLUMNS = ("row", "seed", "recording", "window", "metric", "partition", "region", "ratio")
+
+
+class _Counted(NamedTuple):
+    """What one metric counted by one partition in the windows of one result."""
+
+    row: str
+    record: ResultRecord
+    metric: Metric
+    partition: Partition
+    sums: NDArray[np.int32]
+
+    def keyed(self, frame: pd.DataFrame) -> pd.DataFrame:
+        """Say in a frame what its numbers belong to."""
+        seed = pd.array([self.record.seed] * len(frame), dtype="Int64")
+        return frame.assign(row=self.row, seed=seed, metric=self.metric.name, partition=self.partition.name)
+
+
+def load_figures(
+    run: Path, *, metrics: Sequence[str] | None = None, partitions: Sequence[str] | None = None
+) -> pd.DataFrame:
+    """Return every figure of a run, pooled over the windows of a result: `FIGURE_COLUMNS`.
+
+    Args:
+        run: its folder.
+        metrics: names of `METRICS`, all by default.
+        partitions: names of `PARTITIONS`, all by default.
+
+    Raises:
+        InputError: the run or a result of it cannot be read.
+    """
+    frames = [_figures(counted) for counted in _counted(run, metrics, partitions)]
+    whole = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(FIGURE_COLUMNS))
+    return whole.astype({"seed": "Int64", "value": "float64", "cells": "int64", "windows": "int64"})
+
+
+def tidy(
+    run: Path, *, metrics: Sequence[str] | None = None, partitions: Sequence[str] | None = None
+) -> Iterator[pd.DataFrame]:
+    """Go through what was counted in every window: `WINDOW_COLUMNS`, numerator and denominator, a frame at a time.
+
+    Both can be summed over windows, recordings and seeds; divided, they are the figure of those.
+
+    Raises:
+        InputError: the run or a result of it cannot be read.
+    """
+    for counted in _counted(run, metrics, partitions):
+        yield _windows(counted)
+
+
+def windows_with(sums: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """Tell in which windows and regions anything was counted: (N, regions, ...) -> (N, regions)."""
+    return np.asarray(sums.reshape(*sums.shape[:2], -1).any(axis=2))
+
+
+def pooled(sums: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Sum over windows: (N, ...) -> (...)."""
+    return np.asarray(sums.sum(axis=0, dtype=np.int64))
+
+
+def _counted(run: Path, metrics: Sequence[str] | None, partitions: Sequence[str] | None) -> Iterator[_Counted]:
+    for row in read_run(run).rows:
+        for result_id in row.results:
+            folder = result_folder(run, result_id)
+            record = read_result(folder)
+            for metric in metrics or METRICS:
+                for partition in partitions or PARTITIONS:
+                    sums = read_sums(folder, metric, partition)
+                    if sums is not None:
+                        yield _Counted(row.name, record, METRICS[metric], PARTITIONS[partition], sums)
+
+
+def _figures(counted: _Counted) -> pd.DataFrame:
+    metric, regions, sums = counted.metric, counted.partition.regions, pooled(counted.sums)
+    frame = pd.MultiIndex.from_product([regions, column_names(metric)], names=["region", "column"]).to_frame(
+        index=False
+    )
+    windows = np.repeat(windows_with(counted.sums).sum(axis=0), len(metric.columns))
+    values, cells = metric.figures(metric.ratios(sums)).ravel(), metric.cells(sums).ravel()
+    return counted.keyed(frame.assign(value=values, cells=cells, windows=windows))[list(FIGURE_COLUMNS)]
+
+
+def _windows(counted: _Counted) -> pd.DataFrame:
+    ratios = counted.metric.ratios(counted.sums.astype(np.int64))  # (N, regions, K, 2)
+    places = [range(len(counted.sums)), counted.partition.regions, counted.metric.ratio_names]
+    frame = pd.MultiIndex.from_product(places, names=["window", "region", "ratio"]).to_frame(index=False)
+    recordings = np.array([window.recording for window in counted.record.windows])
+    frame = counted.keyed(frame.assign(recording=recordings[frame.window]))[list(WINDOW_COLUMNS)]
+    return frame.assign(numerator=ratios[..., 0].ravel(), denominator=ratios[..., 1].ravel())

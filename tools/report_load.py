@@ -1,0 +1,149 @@
+"""How long a report of a large run takes, and how much memory: 18 rows, 20 repeats and 500 windows made from nothing.
+
+Example: python tools/report_load.py /tmp/large
+"""
+
+import argparse
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from semgrid_eval.files import digest_value
+from semgrid_eval.grids.spec import MOVING, STANDING, GridSpec
+from semgrid_eval.scores import results
+from semgrid_eval.scores.metrics.metric import ScoredWindows
+from semgrid_eval.scores.metrics.table import Sums, count_windows
+
+CLASSES = 10
+SPEC = GridSpec(rows=32, columns=32, agent_row=32, agent_column=16)
+WRONG = 0.2
+FRAME_NS = 58_823_529
+
+
+def main() -> None:
+    """Make the run where there is none, write its report and print seconds and memory."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("run", type=Path)
+    for name, number in (("rows", 18), ("repeats", 20), ("windows", 500)):
+        parser.add_argument(f"--{name}", type=int, default=number)
+    options = parser.parse_args()
+    if not results.run_file(options.run).is_file():
+        make_run(options.run, options.rows, options.repeats, options.windows)
+    start_s = time.perf_counter()
+    command = "import sys; from pathlib import Path; from semgrid_eval.report.page.write import write_report; "
+    subprocess.run([sys.executable, "-c", command + "write_report(Path(sys.argv[1]))", options.run], check=True)
+    seconds, memory_kib = time.perf_counter() - start_s, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    sys.stdout.write(f"{seconds:.1f} s, {memory_kib / 2**10:.0f} MiB\n")
+
+
+def make_run(run: Path, rows: int, repeats: int, windows: int) -> None:
+    """Write a run of trained rows whose every window is a recording of its own; it keeps no pictures."""
+    records = tuple(_window(i) for i in range(windows))
+    generator = np.random.default_rng(0)
+    base = count_windows(_scored(generator, windows))
+    found = tuple(_row(run, number, repeats, records, base, generator) for number in range(rows))
+    logs = tuple(
+        results.LogRecord(name=w.log, path=w.log, digest=digest_value(w.log), split="val", dataset="none")
+        for w in records
+    )
+    record = results.RunRecord(
+        format_version=results.FORMAT_VERSION,
+        title="Large",
+        command="",
+        matrix={},
+        versions={},
+        machine={},
+        started="2026-01-01T00:00:00Z",
+        seconds=0.0,
+        logs=logs,
+        failed_logs={},
+        rows=found,
+    )
+    results.write_run(run, record)
+
+
+def _row(
+    run: Path,
+    number: int,
+    repeats: int,
+    windows: tuple[results.WindowRecord, ...],
+    base: Sums,
+    generator: np.random.Generator,
+) -> results.RowRecord:
+    facts = results.RowFacts(
+        model="newest" if number == 0 else "ed",
+        family="BL" if number == 0 else "ED",
+        learns=number > 0,
+        baseline=number == 0,
+        inputs=2,
+        step_frames=5,
+        horizon_steps=1,
+        sensors=("full",),
+        translate=True,
+    )
+    ids = []
+    for seed in range(repeats):
+        result_id = digest_value([number, seed])
+        folder = results.result_folder(run, result_id)
+        # Windows in another order and a little thinned out are as good as new predictions.
+        order, kept = generator.permutation(len(windows)), generator.uniform(0.9, 1.0)
+        results.write_sums(folder, {key: (sums[order] * kept).astype(np.int32) for key, sums in base.items()})
+        results.write_result(folder, _result(result_id, seed, facts, windows))
+        ids.append(result_id)
+    name = "BL-DC" if number == 0 else f"ED-{number}"
+    loose = {"experiment": name[3:], "model": name[:2], "inputs": 2, "step_frames": 5, "horizon_steps": 1}
+    rest = {"sensors": ("full",), "translate": True} | loose
+    rest = {key: value for key, value in rest.items() if key in results.RowRecord.model_fields}
+    return results.RowRecord(facts=facts, name=name, label=name, results=tuple(ids), **rest)
+
+
+def _result(
+    result_id: str, seed: int, facts: results.RowFacts, windows: tuple[results.WindowRecord, ...]
+) -> results.ResultRecord:
+    return results.ResultRecord(
+        format_version=results.FORMAT_VERSION,
+        id=result_id,
+        facts=facts,
+        targets="large",
+        lead_s=0.3,
+        config={"model": facts.model},
+        log_digests=(),
+        seed=seed,
+        windows_id="large",
+        windows=windows,
+        device="cpu",
+        train_seconds=1.0,
+        predict_seconds=1.0,
+        parameters=1,
+    )
+
+
+def _window(number: int) -> results.WindowRecord:
+    name = f"drive_{number:03d}"
+    stamps_ns = (10 * FRAME_NS, 15 * FRAME_NS)
+    return results.WindowRecord(
+        recording=name, log=f"{name}.mcap", target_frame=20, target_stamp_ns=20 * FRAME_NS, input_stamps_ns=stamps_ns
+    )
+
+
+def _scored(generator: np.random.Generator, windows: int) -> ScoredWindows:
+    shape = (windows, SPEC.rows, SPEC.columns)
+    target = generator.integers(0, CLASSES, shape).astype(np.uint8)
+    other = generator.integers(0, CLASSES, shape).astype(np.uint8)
+    return ScoredWindows(
+        target=target,
+        prediction=np.where(generator.random(shape) < WRONG, other, target),
+        certainty=generator.integers(0, 256, shape).astype(np.uint8),
+        left_out=generator.random(shape) < 0.1,
+        inputs=generator.integers(0, 2, (windows, 1, 2, *shape[1:])).astype(np.uint8),
+        actors=generator.choice(np.array([0, STANDING, MOVING], np.uint8), shape),
+        spec=SPEC,
+    )
+
+
+if __name__ == "__main__":
+    main()
