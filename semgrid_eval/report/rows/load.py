@@ -92,8 +92,18 @@ class Row:
 
     @property
     def is_baseline(self) -> bool:
-        """Whether the row is one of the model-driven baselines, which need no training."""
-        return self.record.model == "BL"
+        """Whether other rows are measured against this one."""
+        return self.record.facts.baseline
+
+    @property
+    def learns(self) -> bool:
+        """Whether its model was fitted to training windows."""
+        return self.record.facts.learns
+
+    @property
+    def targets(self) -> str:
+        """The comparability key of its results; empty where there is none."""
+        return self.results[0].record.targets if self.results else ""
 
     @property
     def shown(self) -> Result:

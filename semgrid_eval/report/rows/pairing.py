@@ -22,6 +22,11 @@ class Headline:
     reference: Row | None  # the baseline of the best row's own experiment
 
 
+def comparable(row: Row, other: Row) -> bool:
+    """Tell whether rows may be subtracted: both have results, and these have the same targets, in whichever runs."""
+    return row.targets == other.targets != ""
+
+
 def reference_of(row: Row, rows: Sequence[Row]) -> Row | None:
     """Choose the baseline that a row is measured against: of its own experiment, else the nearest one.
 
