@@ -10,20 +10,30 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.scores.iou import category_iou
 
 PAPER_SETTINGS = {
-    "network.depth": ("depth", 3),
-    "network.features": ("features", 64),
-    "training.batch": ("batch", 32),
-    "training.epochs": ("epochs", 40),
-    "training.updates_per_epoch": ("updates an epoch", 185),
-    "training.learning_rate": ("learning rate", 1e-3),
-    "training.learning_rate_drop_epoch": ("learning rate dropped after epoch", 35),
-    "training.learning_rate_after_drop": ("learning rate then", 1e-4),
+    "settings.depth": ("depth", 3),
+    "settings.features": ("features", 64),
+    "settings.training.batch": ("batch", 32),
+    "settings.training.epochs": ("epochs", 40),
+    "settings.training.updates_per_epoch": ("updates an epoch", 185),
+    "settings.training.schedule.learning_rate": ("learning rate", 1e-3),
+    "settings.training.schedule.drop_epoch": ("learning rate dropped after epoch", 35),
+    "settings.training.schedule.learning_rate_after_drop": ("learning rate then", 1e-4),
 }
 """What the supplement says of network and training: words and value by a result's setting."""
 PAPER_DATASET = "cityscapes"
 PAPER_REPEATS = 20
 PAPER_WINDOWS = 500
 """One for each sequence of Cityscapes' validation set."""
+
+
+def in_paper(name: str) -> bool:
+    """Tell whether the paper's table has a row of that name."""
+    return name in paper_table()
+
+
+def paper_value(name: str, column: str) -> float:
+    """Return the paper's value of a class or category for a row of that name, NaN where it has none."""
+    return paper_table().get(name, {}).get(column, np.nan)
 
 
 @cache

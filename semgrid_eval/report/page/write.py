@@ -16,11 +16,11 @@ from semgrid_eval.files import atomic_folder
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.report.claims.claims import MARGIN
 from semgrid_eval.report.claims.findings import Finding, find, finding_table, missing_table, sentence
-from semgrid_eval.report.claims.paper import paper_table
+from semgrid_eval.report.claims.paper import in_paper
 from semgrid_eval.report.estimates.bootstrap import Scores, score_rows
 from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
-from semgrid_eval.report.figures import bars, curves, diagrams
+from semgrid_eval.report.figures import bars, calibration, horizon, settings, training
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.page import provenance
 from semgrid_eval.report.page.colours import class_style
@@ -29,7 +29,7 @@ from semgrid_eval.report.rows.load import Row, Run, load_runs
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, Headline, headline
 from semgrid_eval.report.tables import scores as tables
 from semgrid_eval.report.tables import write as exports
-from semgrid_eval.report.tables.changes import changes_table
+from semgrid_eval.report.tables.changes import changes_table, not_compared_table
 from semgrid_eval.report.tables.pace import PACE_EDGES_MPS, pace_tables, rows_without_pace, score_paces
 from semgrid_eval.report.tables.regions import region_tables, score_regions
 from semgrid_eval.report.tables.table import Table
@@ -106,10 +106,10 @@ def draw_figures(scores: Scores, rows: Sequence[Row], located: Sequence[Where]) 
     return {
         "overview": bars.category_overview(scores),
         "categories": bars.category_plots(scores),
-        "horizon": curves.horizon_plots(scores),
-        "training": curves.training_plots(rows),
-        "calibration": diagrams.calibration_plots(located),
-        "architecture": diagrams.architecture_plots(scores),
+        "horizon": horizon.horizon_plots(scores),
+        "training": training.training_plots(rows),
+        "calibration": calibration.calibration_plots(located),
+        "settings": settings.settings_plots(scores),
     }
 
 
@@ -138,7 +138,7 @@ def render_page(material: Material) -> str:
         | tables.where_tables(material.located)
         | region_tables(material.regions)
         | pace_tables(material.paces),
-        about_settings=sum(e.row.record.name not in paper_table() for e in scores.values()) > len(scores) / 2,
+        about_settings=sum(not in_paper(e.row.record.name) for e in scores.values()) > len(scores) / 2,
         findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
         margin=MARGIN,
         confusions=confusion_tables(scores, found),
@@ -167,6 +167,7 @@ def page_tables(runs: Sequence[Run], scores: Scores) -> dict[str, Table | None]:
         "class_differences": tables.difference_table("class-differences", scores, CLASS_NAMES),
         "classes": tables.class_values(scores),
         "changes": changes_table(scores),
+        "not_compared": not_compared_table(scores),
         "merged": tables.merged_values(scores),
         "windows": tables.window_means(scores),
         "runs": tables.run_differences(scores, [each.tag for each in runs], DIFFERENCE_COLUMNS),

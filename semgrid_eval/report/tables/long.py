@@ -19,12 +19,12 @@ def members() -> dict[str, tuple[int, ...]]:
 
 
 def class_table(scores: Sequence[RowScores]) -> pd.DataFrame:
-    """Return the table with columns row, experiment, model, class, iou, windows, cells, seed."""
+    """Return the table with columns row, family, model, class, iou, windows, cells, seed."""
     return _long(scores, CLASS_NAMES, "class")
 
 
 def category_table(scores: Sequence[RowScores]) -> pd.DataFrame:
-    """Return the table with columns row, experiment, model, category, iou, windows, cells, seed."""
+    """Return the table with columns row, family, model, category, iou, windows, cells, seed."""
     return _long(scores, (*CATEGORY_COLUMNS, *MERGED_COLUMNS), "category")
 
 
@@ -38,11 +38,11 @@ def _long(scores: Sequence[RowScores], names: tuple[str, ...], kind: str) -> pd.
     lines = []
     for entry in scores:
         record = entry.row.record
-        key = (entry.row.name, record.experiment, record.model)
+        key = (entry.row.name, record.facts.family, record.facts.model)
         for result, values in zip(entry.row.results, entry.by_seed, strict=True):
             cells, seed = target_cells(result.counts), result.record.seed
             for name in names:
                 iou = values[COLUMNS.index(name)]
                 lines.append((*key, name, iou, len(result.counts), cells[name], seed))
-    table = pd.DataFrame(lines, columns=["row", "experiment", "model", kind, "iou", "windows", "cells", "seed"])
+    table = pd.DataFrame(lines, columns=["row", "family", "model", kind, "iou", "windows", "cells", "seed"])
     return table.astype({"iou": "float64", "windows": "int64", "cells": "int64", "seed": "Int64"})

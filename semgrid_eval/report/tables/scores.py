@@ -17,7 +17,7 @@ from semgrid_eval.report.estimates.bootstrap import (
     Scores,
     score_columns,
 )
-from semgrid_eval.report.rows.pairing import reference_of, verdict
+from semgrid_eval.report.rows.pairing import comparable, reference_of, verdict
 from semgrid_eval.report.tables.long import target_cells
 from semgrid_eval.report.tables.table import (
     ABSENT,
@@ -95,13 +95,15 @@ def class_values(scores: Scores) -> Table:
 
 
 def run_differences(scores: Scores, tags: Sequence[str], columns: Sequence[str]) -> Table | None:
-    """Show, for rows of one name in several runs, the difference of each later run to the first."""
+    """Show, for rows of one name and the same targets in several runs, the difference of later runs to the first."""
     groups: dict[str, list[RowScores]] = {}
     for entry in scores.values():
         groups.setdefault(entry.row.record.name, []).append(entry)
     bodies = []
     for group in groups.values():
-        bodies += [(_difference_line(entry, group[0], columns),) for entry in group[1:]]
+        bodies += [
+            (_difference_line(entry, group[0], columns),) for entry in group[1:] if comparable(entry.row, group[0].row)
+        ]
     caption = f"The same rows in several runs: differences to {tags[0] if tags else 'the first run'}."
     return Table("runs", caption, "Rows", _headers(scores, columns), tuple(bodies)) if bodies else None
 

@@ -21,9 +21,9 @@ from semgrid_eval.report.estimates.bootstrap import (
     RowScores,
     Scores,
 )
-from semgrid_eval.report.figures.curves import training_frame
-from semgrid_eval.report.figures.diagrams import architecture_frame
+from semgrid_eval.report.figures.settings import settings_frame
 from semgrid_eval.report.figures.style import Plot
+from semgrid_eval.report.figures.training import training_frame
 from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
 from semgrid_eval.report.rows.load import Result, Row, Run
 from semgrid_eval.report.rows.pairing import reference_of
@@ -71,7 +71,7 @@ def write_tables(
     _write_csv(folder / "regions.csv", region_frame(parts["regions"]))
     _write_csv(folder / "paces.csv", pace_frame(parts["paces"]))
     _write_csv(folder / "findings.csv", finding_frame(findings))
-    _write_csv(folder / "architecture.csv", architecture_frame(scores))
+    _write_csv(folder / "settings.csv", settings_frame(scores))
     _write_csv(folder / "training.csv", training_frame([row for run in runs for row in run.rows]))
     _write_csv(folder / "windows.csv", window_frame(runs))
     for run in runs:
