@@ -31,7 +31,9 @@ class FakeRow:
     translate: bool = True
     horizon_steps: int = 1
     failure: str | None = None
+    inputs: int = 2  # on record; there are two
     baseline: bool | None = None  # `BL` are, if not said otherwise
+    learns: bool | None = None  # what is not a baseline does, if not said otherwise
     cell_m: float = 0.78125  # of a grid with other cells, other targets
 
     @property
@@ -43,12 +45,14 @@ class FakeRow:
         found = facts(self.family, self.sensors, self.horizon_steps, translate=self.translate)
         baseline = found.baseline if self.baseline is None else self.baseline
         model = {"BL-Fuse": "fuse", "BL-DC": "newest", "BL-NT": "newest"}.get(self.name, self.family.lower())
-        return found.model_copy(update={"baseline": baseline, "learns": not baseline, "model": model})
+        learns = not baseline if self.learns is None else self.learns
+        changes = {"baseline": baseline, "learns": learns, "model": model, "inputs": self.inputs}
+        return found.model_copy(update=changes)
 
     @property
     def config(self) -> dict[str, object]:
         config: dict[str, object] = {"model": self.facts.model, "sensors": list(self.sensors)}
-        config |= {"translate": self.translate, "window": {"horizon_steps": self.horizon_steps}}
+        config |= {"translate": self.translate, "window": {"horizon_steps": self.horizon_steps, "inputs": self.inputs}}
         config |= {"grid": {"cell_m": self.cell_m}, "settings": {"depth": 3} if self.seeds else {}}
         return config
 

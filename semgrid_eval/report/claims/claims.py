@@ -133,7 +133,7 @@ def _horizons() -> tuple[Claim, ...]:
 
 
 def _builds(builds: list[tuple[str, int, int]]) -> tuple[Claim, ...]:
-    """Compare the deepest with the shallowest networks of equal width, and the widest with the narrowest alike."""
+    """Compare the deepest with the shallowest networks of equal width, and likewise the widest with the narrowest."""
     found = []
     for kind, varied, fixed in (("deeper", 1, 2), ("wider", 2, 1)):
         groups: dict[object, list[tuple[str, int, int]]] = {}

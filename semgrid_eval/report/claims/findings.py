@@ -73,7 +73,7 @@ def find(runs: Sequence[Run], scores: Scores, regions: Mapping[str, Scores]) -> 
 
 
 def judge(rule: Rule, difference: Estimate) -> Verdict:
-    """Hold the interval of a difference against a rule; without an interval nothing is decided."""
+    """Apply a rule to the interval of a difference; without an interval nothing is decided."""
     low, high = difference.low, difference.high
     holds, fails = {
         "better": (low > 0, high < 0),

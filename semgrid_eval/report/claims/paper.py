@@ -1,4 +1,4 @@
-"""The paper's class-wise table (supplement, Table A1) and its training, to stand beside a run's."""
+"""The paper's class-wise table (supplement, Table A1) and its training, for comparison with a run."""
 
 from functools import cache
 from importlib import resources

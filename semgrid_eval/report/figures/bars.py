@@ -30,6 +30,7 @@ from semgrid_eval.report.rows.pairing import by_question
 _GAP = 1.0  # between questions, in bars' places; the words of a question stand in it
 _BAR_IN, _AROUND_IN = 0.19, 0.75  # height of a bar's place, and of title, legend and axis together
 _NAMES_IN, _PANEL_IN = 1.3, 2.5  # widths of the names, which stand once, and of a panel
+_ROOM = 1.2  # width of a panel by its longest bar, which leaves room for the numbers
 _ALONE_IN = 4.2  # width of a panel that stands alone
 
 
@@ -90,11 +91,11 @@ def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group]) -
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
-    axes.set_xlim(0, 1.14 * max(_highest(scores, category), 1e-3))
+    axes.set_xlim(0, _ROOM * max(_highest(scores, category), 1e-3))
 
 
 def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str) -> None:
-    """Draw a bar with its interval, the paper's value, and its number to the right of all of them."""
+    """Draw a bar with its interval, the paper's value, and its number at the right edge of the panel."""
     estimate, paper = entry.estimate(category), paper_value(entry.row.record.name, category)
     axes.barh(place, np.nan_to_num(estimate.value), 0.78, color=colour)
     if np.isfinite(estimate.low):
@@ -102,8 +103,7 @@ def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str)
     if np.isfinite(paper):
         axes.plot(paper, place, "D", markersize=3.4, **PAPER_MARKS)
     label = f"{estimate.value:.2f}" if np.isfinite(estimate.value) else "absent"
-    end = float(np.nanmax([estimate.value, estimate.high, paper, 0.0]))
-    axes.annotate(label, (end, place), (4, 0), textcoords="offset points", va="center", fontsize=7)
+    axes.text(1, place, label, transform=axes.get_yaxis_transform(), ha="right", va="center", fontsize=7)
 
 
 def _name_rows(axes: Axes, groups: Sequence[Group]) -> None:

@@ -25,12 +25,13 @@ _HORIZON = "horizon_steps"
 
 
 def horizon_lines(scores: Scores) -> list[list[RowScores]]:
-    """Return the rows of one run that differ in the horizon alone, same targets, ordered by lead; two or more a line."""
+    """Return the rows of one run with the same targets that differ in the horizon alone, by lead; at least two."""
     lines: dict[object, dict[float, RowScores]] = {}
     for entry in scores.values():
         key = (entry.row.run, entry.row.targets, settings_but(entry.row, _HORIZON))
         lines.setdefault(key, {}).setdefault(_lead_s(entry), entry)  # rows that mean the same are one point
-    return [[line[lead] for lead in sorted(line)] for line in lines.values() if len(line) > 1]
+    found = [[line[lead] for lead in sorted(line)] for line in lines.values() if len(line) > 1]
+    return sorted(found, key=lambda line: not line[0].row.is_baseline)
 
 
 def horizon_plots(scores: Scores) -> list[Plot]:

@@ -43,7 +43,7 @@ def not_compared_table(scores: Scores) -> Table | None:
         if main
         else ""
     )
-    columns = (("What differs", ""), ("Windows", "shared"))
+    columns = (("What differs", ""), ("Windows", ""))
     return Table("not-compared", caption, "Rows with the same targets", columns, bodies) if bodies else None
 
 
@@ -53,7 +53,10 @@ def _other_targets(group: Sequence[Row], with_main: Sequence[Row]) -> Line:
     base = min(with_main, key=lambda other: len(changed_settings(settings_of(other), settings_of(row))))
     reasons = changed_targets(settings_of(base), settings_of(row)) or ["the logs or their frames"]
     shared = shared_windows(row, base)
-    cells = (Cell(f"{'; '.join(reasons)} (against {base.name})"), Cell(f"{row.windows:,}", row.windows, f"{shared:,}"))
+    cells = (
+        Cell(f"{'; '.join(reasons)} (against {base.name})"),
+        Cell(f"{row.windows:,}", row.windows, f"{shared:,} shared"),
+    )
     return Line(", ".join(each.name for each in group), cells)
 
 

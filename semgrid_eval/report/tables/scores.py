@@ -37,20 +37,25 @@ from semgrid_eval.scores.iou import mean_finite
 
 _PAPER = (
     "The paper's values (Table A1) come from Cityscapes' validation set; "
-    "differences to them are marked where the row's interval leaves them out."
+    "differences to them are marked where the row's interval excludes them."
 )
 
 
 def value_table(name: str, caption: str, scores: Scores, columns: Sequence[str], *, beside_paper: bool = True) -> Table:
-    """Show the columns of every row, the best of each marked, beside the paper's values where it has them."""
-    best = {column: _best(scores, column) for column in columns}
-    bodies = tuple(_value_body(entry, best, beside_paper=beside_paper) for entry in scores.values())
+    """Show the columns of every row, with the best marked, beside the paper's values where it has them."""
+    bodies = tuple(
+        _value_body(entry, {column: _best(entry, scores, column) for column in columns}, beside_paper=beside_paper)
+        for entry in scores.values()
+    )
     return Table(name, caption, "Row", _headers(scores, columns), bodies)
 
 
 def category_values(scores: Scores) -> Table:
     """Show the categories as the paper counts them."""
-    caption = "Category scores: mean of the class IoUs, with 95% interval. Best of each column in bold. " + _PAPER
+    caption = (
+        "Category scores: mean of the class IoUs, with 95% interval. Best among rows with the same targets in bold. "
+        + _PAPER
+    )
     return value_table("categories", caption, scores, CATEGORY_COLUMNS)
 
 
@@ -152,8 +157,9 @@ def _short_count(count: int) -> str:
     return f"{count:,}"
 
 
-def _best(scores: Scores, column: str) -> float:
-    values = [entry.mean[column] for entry in scores.values()]
+def _best(row: RowScores, scores: Scores, column: str) -> float:
+    """Return the best value among the rows that can be compared with one."""
+    values = [entry.mean[column] for entry in scores.values() if comparable(row.row, entry.row)]
     return max((value for value in values if np.isfinite(value)), default=np.nan)
 
 

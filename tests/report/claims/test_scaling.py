@@ -1,4 +1,6 @@
 from dataclasses import replace
+from functools import reduce
+from operator import getitem
 
 import pytest
 
@@ -7,7 +9,7 @@ from semgrid_eval.report.claims.scaling import scaling
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.runs.matrix import load_matrix
 
-PAPER = {"network": {"depth": 3, "features": 64}, "training": {"batch": 32, "epochs": 40, "updates_per_epoch": 185}}
+PAPER = {"depth": 3, "features": 64, "training": {"batch": 32, "epochs": 40, "updates_per_epoch": 185}}
 
 
 @pytest.fixture(scope="module")
@@ -17,12 +19,12 @@ def trained(run):
     return replace(found, rows=tuple(row for row in found.rows if row.name in ("ED-DC", "ED-Sp2")))
 
 
-def _configured(run, repeats, windows, **config):
-    """The run with results of that configuration, as many of each row, on as many windows."""
+def _configured(run, repeats, windows, **settings):
+    """The run with results of a model with these settings, as many of each row, on as many windows."""
     rows = []
     for row in run.rows:
         first = row.results[0]
-        record = first.record.model_copy(update={"config": config})
+        record = first.record.model_copy(update={"config": {"settings": settings}})
         results = (replace(first, record=record, counts=first.counts[:1].repeat(windows, axis=0)),) * repeats
         rows.append(replace(row, results=results))
     return replace(run, rows=tuple(rows))
@@ -39,8 +41,7 @@ def test_a_run_as_large_as_the_papers_says_so(trained):
 
 
 def test_what_is_smaller_is_named_beside_the_papers_value(trained):
-    network = {"depth": 3, "features": 32}
-    text = scaling(_configured(trained, 1, 120, network=network, training={"epochs": 20}))
+    text = scaling(_configured(trained, 1, 120, depth=3, features=32, training={"epochs": 20}))
     assert text == (
         "Scaled from the paper's supplement: features 32 instead of 64, epochs 20 instead of 40, "
         "repeats 1 instead of 20, scored windows 120 instead of 500, data synthetic instead of Cityscapes."
@@ -54,8 +55,8 @@ def test_other_data_beside_the_papers_is_named(trained):
 
 
 def test_rows_that_differ_are_told_apart(trained):
-    small = _configured(trained, 1, 500, network={"features": 16}).rows[0]
-    large = _configured(trained, 1, 500, network={"features": 32}).rows[1]
+    small = _configured(trained, 1, 500, features=16).rows[0]
+    large = _configured(trained, 1, 500, features=32).rows[1]
     assert "features 16 or 32 instead of 64" in scaling(replace(trained, rows=(small, large)))
 
 
@@ -66,8 +67,6 @@ def test_a_run_without_a_trained_row_of_the_paper_says_nothing(run):
 
 def test_the_papers_settings_are_those_of_its_preset():
     row = next(row for row in load_matrix("paper").rows if row.name == "ED-DC")
-    settings = row.model_dump()
     for key, (_, value) in PAPER_SETTINGS.items():
-        section, name = key.split(".")
-        assert settings[section][name] == value
+        assert reduce(getitem, key.split("."), row.model_dump()) == value
     assert row.repeats == PAPER_REPEATS

@@ -12,16 +12,16 @@ def _scores(run):
 
 def test_there_is_a_line_for_each_row_seed_and_class(run):
     table = class_table(_scores(run))
-    assert list(table.columns) == ["row", "experiment", "model", "class", "iou", "windows", "cells", "seed"]
+    assert list(table.columns) == ["row", "family", "model", "class", "iou", "windows", "cells", "seed"]
     assert len(table) == (4 + 3 + 2) * len(CLASS_NAMES)
-    assert sorted(table[(table.experiment == "DC") & (table.model == "ED")].seed.unique()) == [0, 1, 2]
-    assert table[table.model == "BL"].seed.isna().all()
+    assert sorted(table[table.row == "ED-DC"].seed.unique()) == [0, 1, 2]
+    assert table[table.family == "BL"].seed.isna().all()
     assert not table.duplicated(["row", "class", "seed"]).any()
 
 
 def test_there_is_a_line_for_each_row_seed_and_category(run):
     table = category_table(_scores(run))
-    assert list(table.columns) == ["row", "experiment", "model", "category", "iou", "windows", "cells", "seed"]
+    assert list(table.columns) == ["row", "family", "model", "category", "iou", "windows", "cells", "seed"]
     assert list(table.category.unique()) == [*CATEGORY_COLUMNS, *MERGED_COLUMNS]
     assert (table.windows == 16).all()
 

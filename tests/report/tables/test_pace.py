@@ -92,7 +92,7 @@ def test_a_run_that_knows_no_drive_says_so(tmp_path, drives):
     assert scored(runs) == {}
     assert set(pace_tables({}).values()) == {None}
     page = write_report(tmp_path / "run")
-    assert "No result here tells how its vehicle drove" in page.read_text()
+    assert "No result here tells how fast its vehicle drove" in page.read_text()
     assert (page.parent / "paces.csv").read_text().count("\n") == 1
 
 
@@ -118,4 +118,4 @@ def test_results_of_older_versions_do_not_hide_newer_ones(runs):
 def test_a_run_with_pictures_shows_its_paces(seen_page):
     text = seen_page.read_text()
     assert 'id="table-paces"' in text
-    assert "No result here tells how its vehicle drove" not in text
+    assert "No result here tells how fast its vehicle drove" not in text
