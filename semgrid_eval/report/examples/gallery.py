@@ -6,8 +6,8 @@ from functools import lru_cache
 
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.report.examples.choose import Contest, Pick, choose, choose_by_class, contests
-from semgrid_eval.report.examples.kept import Glimpses
 from semgrid_eval.report.examples.panels import Example, Shown, draw_examples
+from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import Row, Run, WindowReader
 from semgrid_eval.report.rows.pairing import Headline
 from semgrid_eval.scores.results import read_windows
@@ -42,7 +42,7 @@ def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | N
     chosen = contests(rows, found)
     if not chosen:
         return []
-    kept = {run.folder: Glimpses(run) for run in runs}
+    kept = {run.folder: RunThumbnails(run) for run in runs}
     main, *others = chosen
     plans = [
         {"": choose(main, best=_BEST, worst=_WORST), ", class by class": choose_by_class(main)},
@@ -58,14 +58,14 @@ def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | N
 
 
 def groups_of(
-    contest: Contest, plan: Mapping[str, Sequence[Pick]], glimpses: Glimpses, read: WindowReader = read_windows
+    contest: Contest, plan: Mapping[str, Sequence[Pick]], thumbnails: RunThumbnails, read: WindowReader = read_windows
 ) -> list[Group]:
     """Draw the chosen windows of a contest, a group for each end of its title; what cannot be read is their problem."""
     windows: dict[str, tuple[Example, ...]] = dict.fromkeys(plan, ())
     problem = ""
     try:
         shown = Shown(contest, {pick.index for picks in plan.values() for pick in picks}, read)
-        windows = {end: tuple(draw_examples(shown, picks, glimpses)) for end, picks in plan.items()}
+        windows = {end: tuple(draw_examples(shown, picks, thumbnails)) for end, picks in plan.items()}
     except (SemgridError, ValueError, IndexError) as error:
         problem = f"The pictures of {contest.model.name} cannot be shown: {error}"
     return [
@@ -90,7 +90,7 @@ def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
     if not any(len(row.record.facts.sensors) > 1 for row in rows):
         said.append("No row has several sensors, so there is no example with a blind band.")
     if not any(group.looks_ahead for group in groups):
-        said.append("The model was not run with several horizons, so there is no example of them in a row.")
+        said.append("The model shown first was not run with several horizons, so there is no example of them in a row.")
     shown = [window for group in groups for window in group.windows]
     pictures = [picture for window in shown for column in window.film for picture in column.pictures]
     if shown and not any(picture.kind == "camera" for picture in pictures):

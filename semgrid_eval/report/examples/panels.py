@@ -18,7 +18,7 @@ from semgrid_eval.report.examples.drawing import (
     grid_picture,
     right_png,
 )
-from semgrid_eval.report.examples.kept import Glimpses, times
+from semgrid_eval.report.examples.thumbnails import RunThumbnails, times
 from semgrid_eval.report.rows.load import Row, WindowReader, key_of
 from semgrid_eval.report.tables.table import ABSENT, number, plural, signed
 from semgrid_eval.scores.results import read_predictions, read_windows
@@ -170,13 +170,13 @@ class Shown:
         }
 
 
-def draw_examples(shown: Shown, picks: Sequence[Pick], glimpses: Glimpses) -> Iterator[Example]:
+def draw_examples(shown: Shown, picks: Sequence[Pick], thumbnails: RunThumbnails) -> Iterator[Example]:
     """Draw the chosen windows of a contest, each window once."""
     contest, result = shown.contest, shown.contest.result
     for group in by_window(picks):
         index = group[0].index
         window = result.record.windows[index]
-        kept = glimpses.of(window.log, result)
+        kept = thumbnails.of(window.log, result)
         view = View(window, kept, result.grid, contest.model.record.facts.sensors)
         film = tuple(shown.film(index, view))
         answers = tuple(shown.answers(index))
@@ -187,7 +187,7 @@ def draw_examples(shown: Shown, picks: Sequence[Pick], glimpses: Glimpses) -> It
             log=window.log,
             frame=window.target_frame,
             times=times(window.target_stamp_ns, kept),
-            command=glimpses.command(contest.model, window),
+            command=thumbnails.command(contest.model, window),
             film=film,
             answers=answers,
             legend=_legend([*film, *answers], {HATCHED} if hatching else set()),

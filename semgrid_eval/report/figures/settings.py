@@ -46,9 +46,10 @@ def _plot(varied: Varied, name: str) -> Plot:
             axes.set_xticks(places, [f"{place:g}" for place in places])
             axes.set_xlabel(_word(varied.keys[0]))
             axes.margins(x=0.15)
+        slowest_ms = 1.1 * max(_window_ms(entry) for entry in varied.rows)
         score.set(ylabel="mean class IoU without unknown")
-        time.set(ylabel="time of a prediction / ms", ylim=(0, None))
-        front.set(xlabel="time of a prediction / ms", ylabel="mean class IoU without unknown", xlim=(0, None))
+        time.set(ylabel="time of a prediction / ms", ylim=(0, slowest_ms))
+        front.set(xlabel="time of a prediction / ms", ylabel="mean class IoU without unknown", xlim=(0, slowest_ms))
         front.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
         return finish(figure, name, "settings.csv", _caption(varied))
 

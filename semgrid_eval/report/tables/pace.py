@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from semgrid_eval.report.estimates.bootstrap import Scores, score_rows
-from semgrid_eval.report.examples.kept import Glimpses
+from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import Result, Row, Run
 from semgrid_eval.report.tables.side_by_side import part_differences, part_frame, part_values
 from semgrid_eval.report.tables.table import Table
@@ -29,7 +29,7 @@ def score_paces(runs: Sequence[Run], rows: Sequence[Row], seed: int) -> dict[str
 
     A pace is one of `PACES`: speeds between `PACE_EDGES_MPS`, below the first of which a vehicle stands.
     """
-    kept = {run.folder: Glimpses(run) for run in runs}
+    kept = {run.folder: RunThumbnails(run) for run in runs}
     shared: dict[_Key, NDArray[np.int64]] = {}
     for row in rows:
         for result in row.results:
@@ -71,7 +71,7 @@ def mean_speed_mps(drive: Drive, from_ns: int, to_ns: int) -> float:
     return float(np.hypot(x_m[1] - x_m[0], y_m[1] - y_m[0]) / ((to_ns - from_ns) * 1e-9))
 
 
-def _paces(result: Result, kept: Glimpses) -> NDArray[np.int64]:
+def _paces(result: Result, kept: RunThumbnails) -> NDArray[np.int64]:
     """Number the pace of each window: (N,), -1 where nothing is known of the drive."""
     found = np.full(len(result.record.windows), -1, np.int64)
     for i, window in enumerate(result.record.windows):

@@ -158,9 +158,9 @@ def _short_count(count: int) -> str:
 
 
 def _best(row: RowScores, scores: Scores, column: str) -> float:
-    """Return the best value among the rows that can be compared with one."""
+    """Return the best value among the rows that can be compared with one, NaN where there is no other."""
     values = [entry.mean[column] for entry in scores.values() if comparable(row.row, entry.row)]
-    return max((value for value in values if np.isfinite(value)), default=np.nan)
+    return max((value for value in values if np.isfinite(value)), default=np.nan) if len(values) > 1 else np.nan
 
 
 def _evidence(entry: RowScores, column: str) -> str:

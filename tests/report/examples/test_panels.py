@@ -5,8 +5,8 @@ import pytest
 
 from semgrid_eval.report.examples.choose import Contest, Pick
 from semgrid_eval.report.examples.drawing import HATCH_LEGEND, MASK_LEGEND
-from semgrid_eval.report.examples.kept import Glimpses
 from semgrid_eval.report.examples.panels import Shown, draw_examples
+from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import load_runs
 
 PICK = Pick(0, "Largest", 0.25)
@@ -21,7 +21,7 @@ def opened(folder):
 def draw(folder, model, *rivals, picks=(PICK,), baselines=()):
     run, rows = opened(folder)
     contest = Contest(rows[model], tuple(rows[name] for name in rivals), tuple(rows.get(name) for name in baselines))
-    return list(draw_examples(Shown(contest, {pick.index for pick in picks}), picks, Glimpses(run)))
+    return list(draw_examples(Shown(contest, {pick.index for pick in picks}), picks, RunThumbnails(run)))
 
 
 def kinds(column):
@@ -115,6 +115,6 @@ def test_a_rival_without_the_window_is_left_out(seen):
     rival = rows["BL-DC"]
     record = rival.shown.record.model_copy(update={"windows": rival.shown.record.windows[1:]})
     shorter = replace(rival, results=(replace(rival.shown, record=record, counts=rival.shown.counts[1:]),))
-    (example,) = draw_examples(Shown(Contest(rows["own-DC"], (shorter,)), {PICK.index}), (PICK,), Glimpses(run))
+    (example,) = draw_examples(Shown(Contest(rows["own-DC"], (shorter,)), {PICK.index}), (PICK,), RunThumbnails(run))
     assert [column.title for column in example.answers] == ["own-DC", "Certainty"]
     assert np.all([column.pictures for column in example.answers])

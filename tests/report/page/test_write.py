@@ -250,3 +250,25 @@ def test_several_runs_are_shown_side_by_side(side_by_side):
     assert "BL-DC (first)" in text
     for number in (1, 2):
         assert (side_by_side.parent / f"matrix-{number}.yaml").is_file()
+
+
+def test_rows_on_another_grid_are_not_subtracted_and_the_page_says_why(tmp_path):
+    rows = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 1), FakeRow("fine", "ED", 0.1, 1, cell_m=0.5))
+    page = _report_of(tmp_path, rows=rows)
+    text = _read(page).text
+    assert "ED-DC \N{MINUS SIGN} BL-DC" in text
+    assert "ED-fine \N{MINUS SIGN}" not in text
+    assert "Not compared with BL-DC and the rows that share its targets." in text
+    assert "ED-fine grid.cell_m 0.78125 to 0.5 (against ED-DC)" in text
+    assert read_json(page.parent / "report.json")["rows"]["ED-fine"]["reference"] is None
+
+
+def test_runs_with_different_windows_are_not_subtracted_and_the_page_says_why(tmp_path):
+    runs = [
+        make_fake_run(tmp_path / name, rows=(FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 1)), recordings=count)
+        for name, count in (("whole", 3), ("part", 2))
+    ]
+    text = _read(write_report(runs, tmp_path / "report")).text
+    assert "ED-DC (part) \N{MINUS SIGN} BL-DC (part)" in text
+    assert "(part) \N{MINUS SIGN} ED-DC (whole)" not in text
+    assert "BL-DC (part), ED-DC (part) the logs or their frames (against BL-DC (whole)) 4 4 shared" in text
