@@ -29,9 +29,8 @@ from semgrid_eval.report.rows.pairing import by_question
 
 _GAP = 1.0  # between questions, in bars' places; the words of a question stand in it
 _BAR_IN, _AROUND_IN = 0.19, 0.75  # height of a bar's place, and of title, legend and axis together
-_NAMES_IN, _PANEL_IN = 1.3, 2.5  # widths of the names, which stand once, and of a panel
+_WIDE_IN = 11.3  # all of the page
 _ROOM = 1.2  # width of a panel by its longest bar, which leaves room for the numbers
-_ALONE_IN = 4.2  # width of a panel that stands alone
 
 
 @dataclass(frozen=True)
@@ -43,13 +42,21 @@ class Group:
 
 
 def category_plots(scores: Scores) -> list[Plot]:
-    """Draw the four panels, one figure each."""
-    return [category_plot(scores, (name,), f"category_{name}") for name in CATEGORY_NAMES] if scores else []
-
-
-def category_overview(scores: Scores) -> list[Plot]:
-    """Draw the four panels side by side in one figure."""
-    return [category_plot(scores, CATEGORY_NAMES, "categories")] if scores else []
+    """Draw a panel for each category side by side in one figure, which names the rows once."""
+    if not scores:
+        return []
+    groups = lay_out(scores)
+    places = [place for group in groups for place in group.places.values()]
+    size_in = (_WIDE_IN, _AROUND_IN + _BAR_IN * (max(places) + 1 + _GAP))
+    with mpl.rc_context(SETTINGS):
+        figure = Figure(figsize=size_in, layout="constrained")
+        panels = figure.subplots(1, len(CATEGORY_NAMES), sharey=True)
+        for axes, category in zip(panels, CATEGORY_NAMES, strict=True):
+            _panel(axes, scores, category, groups)
+        _name_rows(panels[0], groups)
+        _legend(figure, scores)
+        caption = f"Category IoU by row ({evidence(scores)}). Rows that answer the same question stand together;"
+        return [finish(figure, "categories", "summary.csv", f"{caption} lines are 95% intervals{paper_note(scores)}")]
 
 
 def lay_out(scores: Scores) -> list[Group]:
@@ -61,24 +68,6 @@ def lay_out(scores: Scores) -> list[Group]:
         groups.append(Group(_words(rows[0], questions[0][0]), {row.name: at + i for i, row in enumerate(ordered)}))
         at += len(rows) + _GAP
     return groups
-
-
-def category_plot(scores: Scores, categories: Sequence[str], name: str) -> Plot:
-    """Draw a panel for each of the categories, side by side."""
-    groups = lay_out(scores)
-    places = [place for group in groups for place in group.places.values()]
-    wide_in = _PANEL_IN if len(categories) > 1 else _ALONE_IN
-    size_in = (_NAMES_IN + wide_in * len(categories), _AROUND_IN + _BAR_IN * (max(places) + 1 + _GAP))
-    with mpl.rc_context(SETTINGS):
-        figure = Figure(figsize=size_in, layout="constrained")
-        panels = np.atleast_1d(figure.subplots(1, len(categories), sharey=True))
-        for axes, category in zip(panels, categories, strict=True):
-            _panel(axes, scores, category, groups)
-        _name_rows(panels[0], groups)
-        _legend(figure, scores)
-        words = ", ".join(LABELS[category].lower() for category in categories)
-        caption = f"IoU of {words} by row ({evidence(scores)}). Rows that answer the same question stand together;"
-        return finish(figure, name, "summary.csv", f"{caption} lines are 95% intervals{paper_note(scores)}")
 
 
 def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group]) -> None:

@@ -104,7 +104,6 @@ def gather(runs: Sequence[Run]) -> Material:
 def draw_figures(scores: Scores, rows: Sequence[Row], located: Sequence[Where]) -> dict[str, list[Plot]]:
     """Draw all figures by section of the page."""
     return {
-        "overview": bars.category_overview(scores),
         "categories": bars.category_plots(scores),
         "horizon": horizon.horizon_plots(scores),
         "training": training.training_plots(rows),

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -11,17 +10,6 @@ from semgrid_eval.report.rows.load import Row, key_of
 
 HEADLINE = "mean_known"
 DIFFERENCE_COLUMNS = ("static_known", "small_static", "vehicles", "small_dynamic", HEADLINE)
-
-
-class Question(NamedTuple):
-    """What a row is asked: which targets, from which inputs, how far ahead."""
-
-    targets: str
-    sensors: tuple[str, ...]
-    inputs: int
-    step_frames: int
-    horizon_steps: int
-    translate: bool
 
 
 @dataclass(frozen=True)
@@ -39,17 +27,17 @@ def comparable(row: Row, other: Row) -> bool:
     return row.targets == other.targets != ""
 
 
-def question_of(row: Row) -> Question:
-    """Return what a row is asked; rows of the same question can be compared without reservation."""
-    facts = row.record.facts
-    return Question(row.targets, facts.sensors, facts.inputs, facts.step_frames, facts.horizon_steps, facts.translate)
-
-
 def by_question(rows: Sequence[Row]) -> list[list[Row]]:
-    """Group rows by their questions, in the order in which these first appear."""
-    groups: dict[Question, list[Row]] = {}
+    """Group rows by what they are asked, in the order in which this first appears.
+
+    Rows answer the same question if they have the same targets, sensors, number of inputs, frames between them and
+    horizon, and if inputs are moved to the target's time for all of them or for none.
+    """
+    groups: dict[tuple[object, ...], list[Row]] = {}
     for row in rows:
-        groups.setdefault(question_of(row), []).append(row)
+        f = row.record.facts
+        question = (row.targets, f.sensors, f.inputs, f.step_frames, f.horizon_steps, f.translate)
+        groups.setdefault(question, []).append(row)
     return list(groups.values())
 
 

@@ -8,7 +8,7 @@ from PIL import Image
 from support.fake_run import FakeRow, counted_row, make_fake_run
 
 from semgrid_eval.report.estimates.bootstrap import score_rows
-from semgrid_eval.report.figures.bars import category_overview, category_plot, category_plots, lay_out
+from semgrid_eval.report.figures.bars import category_plots, lay_out
 from semgrid_eval.report.figures.style import INK, PALETTE, family_colours
 from semgrid_eval.report.rows.load import load_runs
 
@@ -34,6 +34,11 @@ def scores(tmp_path_factory):
     return _scores(load_runs([run])[0].rows)
 
 
+def _plot(scores):
+    (plot,) = category_plots(scores)
+    return plot
+
+
 def _texts(svg):
     """Where each text of a drawing stands: x and y in points, y downwards."""
     texts = [each for each in ET.fromstring(svg).iter() if each.tag.endswith("text")]
@@ -52,7 +57,7 @@ def test_rows_of_one_question_stand_together_baselines_first_with_gaps_between(s
 
 
 def test_each_row_is_named_in_full_and_each_question_in_words(scores):
-    texts = _texts(category_plot(scores, ("vehicles",), "vehicles").svg)
+    texts = _texts(_plot(scores).svg)
     assert set(scores) | {group.words for group in lay_out(scores)} <= set(texts)
     assert f"{scores['ED-DC'].mean['vehicles']:.2f}" in texts
     assert texts["BL-DC"][1] < texts["ED-DC"][1] < texts["ED-PH1"][1]
@@ -60,7 +65,7 @@ def test_each_row_is_named_in_full_and_each_question_in_words(scores):
 
 def test_one_question_needs_no_words():
     rows = [counted_row(name, {"car": [60, 80]}) for name in ("ED-DC", "BL-DC")]
-    texts = _texts(category_plot(_scores(rows), ("vehicles",), "vehicles").svg)
+    texts = _texts(_plot(_scores(rows)).svg)
     assert not any("ahead" in (text or "") for text in texts)
 
 
@@ -70,43 +75,34 @@ def test_families_have_one_colour_each_those_of_baselines_first(scores):
     assert list(family_colours(row for row in rows if not row.is_baseline)) == ["ED", "BL"]
 
 
-def test_all_panels_in_one_figure_name_the_rows_once(scores):
-    (plot,) = category_overview(scores)
+def test_the_panels_of_all_categories_name_the_rows_once(scores):
+    plot = _plot(scores)
     texts = [each.text for each in ET.fromstring(plot.svg).iter() if each.tag.endswith("text")]
     assert texts.count("ED-DC") == 1
     assert {"Static", "Small static", "Vehicles", "Small dynamic", "BL", "ED"} <= set(texts)
     assert Image.open(io.BytesIO(plot.png)).width > 1500
-
-
-def test_there_is_a_panel_for_each_category(scores):
-    assert [panel.name for panel in category_plots(scores)] == [
-        "category_static",
-        "category_small_static",
-        "category_vehicles",
-        "category_small_dynamic",
-    ]
-    assert category_plots({}) == category_overview({}) == []
+    assert category_plots({}) == []
 
 
 def test_a_panel_says_what_it_rests_on(scores):
-    panel = category_plot(scores, ("vehicles",), "vehicles")
+    panel = _plot(scores)
     assert "(2 windows a row, 2 recordings)" in panel.caption
     assert "diamonds are the paper's values" in panel.caption
     assert panel.source == "summary.csv"
 
 
 def test_more_rows_make_a_panel_higher_and_no_wider(scores):
-    few, many = (category_plot(dict(list(scores.items())[:n]), ("vehicles",), "x") for n in (2, 8))
+    few, many = (_plot(dict(list(scores.items())[:n])) for n in (2, 8))
     assert few.width_px == many.width_px
     assert few.height_px < many.height_px
 
 
 def test_rows_that_the_paper_lacks_have_no_diamonds(scores):
-    assert "diamonds" not in category_plot({"ED-fine": scores["ED-fine"]}, ("vehicles",), "vehicles").caption
+    assert "diamonds" not in _plot({"ED-fine": scores["ED-fine"]}).caption
 
 
 def test_the_themed_drawing_keeps_its_text_and_follows_the_theme(scores):
-    panel = category_plots(scores)[0]
+    panel = _plot(scores)
     assert _texts(panel.themed_svg) == _texts(panel.svg)
     assert "prefers-color-scheme:dark" in panel.themed_svg
     assert INK not in panel.themed_svg.split("</style>", 1)[1]
@@ -117,4 +113,4 @@ def test_names_in_any_script_are_drawn(scores):
     facts = entry.row.record.facts.model_copy(update={"family": "\u6a21\u578b \x1b[0m"})
     record = entry.row.record.model_copy(update={"facts": facts})
     odd = {"\u9053\u8def": replace(entry, row=replace(entry.row, name="\u9053\u8def", record=record))}
-    assert {"\u9053\u8def", "\u6a21\u578b  [0m"} <= set(_texts(category_plot(odd, ("static",), "odd").svg))
+    assert {"\u9053\u8def", "\u6a21\u578b  [0m"} <= set(_texts(_plot(odd).svg))

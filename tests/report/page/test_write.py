@@ -130,14 +130,14 @@ def test_the_tables_hold_the_numbers_of_the_long_form(page):
 def test_files_beside_the_page_are_there(page):
     names = {str(path.relative_to(page.parent)) for path in page.parent.rglob("*") if path.is_file()}
     assert {"index.html", "classes.csv", "categories.csv", "summary.csv", "summary.md", "summary.tex"} <= names
-    for name in ("categories", "category_static", "training"):
+    for name in ("categories", "training"):
         assert {f"figures/{name}.png", f"figures/{name}.svg"} <= names
 
 
 def test_every_figure_names_the_table_that_it_was_drawn_from(page):
     text = page.read_text(encoding="utf-8")
     sources = re.findall(r"Drawn from <code>(.*?)</code>; also as <code>(.*?)</code>", text)
-    assert len(sources) > 5
+    assert len(sources) >= 3
     for names in sources:
         for name in names:
             assert (page.parent / name).is_file()
