@@ -87,3 +87,13 @@ def test_report_reads_files_and_needs_neither_torch_nor_runs():
             for name in imports(path):
                 assert not name.startswith(forbidden), f"{path.name} imports {name}"
                 assert not name.startswith("semgrid_eval.scores") or name.startswith(allowed), name
+
+
+def test_names_of_rows_mean_something_to_the_papers_claims_alone():
+    told = [
+        f"{path.relative_to(ROOT)}: {word}"
+        for path in (*(ROOT / "report").rglob("*.py"), *(ROOT / "report").rglob("*.j2"))
+        for word in ("BL-", "ED-", '"BL"', '"ED"', '"DC"', '.partition("-")')
+        if "claims" not in path.parts and word in path.read_text()
+    ]
+    assert told == []

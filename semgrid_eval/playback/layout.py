@@ -20,7 +20,7 @@ def viewer_layout(row: RowRecord, cameras: Sequence[str]) -> dict[str, Any]:
     layout: dict[str, Any] = json.loads(text)
     shown = layout["configById"]["3D!input"]["topics"]
     settings = shown.pop(f"{GRID_INPUT}/{{sensor}}")
-    shown.update({f"{GRID_INPUT}/{sensor}": settings for sensor in row.sensors})
+    shown.update({f"{GRID_INPUT}/{sensor}": settings for sensor in row.facts.sensors})
     if not cameras:
         panels = layout["configById"]
         layout["configById"] = {name: panels[name] for name in panels if not name.startswith("Image!")}

@@ -160,7 +160,7 @@ def _check_shapes(
 ) -> None:
     flat = (len(record.windows), grid.spec.rows, grid.spec.columns)
     for name, array in arrays.items():
-        expected = (flat[0], len(row.sensors), row.inputs, *flat[1:]) if name == "inputs" else flat
+        expected = (flat[0], len(row.facts.sensors), row.facts.inputs, *flat[1:]) if name == "inputs" else flat
         if array.shape != expected:
             raise ResultError(f"has shape {array.shape}, not {expected}", path=folder, field=name)
 
@@ -245,7 +245,7 @@ class _Messages:
     ) -> Iterator[tuple[str, NDArray[np.uint8], GridLayer, int]]:
         """Return topic, values (H, W), their meaning and since when they could be known, of each grid of a window."""
         arrays, row = self._scored.arrays, self._scored.row
-        for sensor, past in zip(row.sensors, arrays["inputs"][index], strict=True):
+        for sensor, past in zip(row.facts.sensors, arrays["inputs"][index], strict=True):
             for back, (values, stamp_ns) in enumerate(zip(past[::-1], inputs_ns[::-1], strict=True)):
                 topic = f"{topics.GRID_INPUT}/{sensor}" + (f"/before_{back}" if back else "")
                 yield topic, values, CLASSES, stamp_ns
@@ -259,9 +259,9 @@ class _Messages:
             return window.input_stamps_ns
         if self._backdrop is None:
             raise ResultError("its result keeps no times of inputs; add the logs", field=f"row {self._scored.row.name}")
-        row = self._scored.row
-        last = self._backdrop.frame_at(window.target_stamp_ns) - row.horizon_steps * row.step_frames
-        return tuple(self._backdrop.stamp_ns(last - back * row.step_frames) for back in reversed(range(row.inputs)))
+        facts = self._scored.row.facts
+        last = self._backdrop.frame_at(window.target_stamp_ns) - facts.horizon_steps * facts.step_frames
+        return tuple(self._backdrop.stamp_ns(last - back * facts.step_frames) for back in reversed(range(facts.inputs)))
 
 
 def _metadata(record: RunRecord, scored: _Scored, shifts_ns: dict[str, int]) -> dict[str, str]:

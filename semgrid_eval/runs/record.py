@@ -73,14 +73,7 @@ def _row_record(row: Row, first_seed: int, outcomes: Mapping[str, Outcome]) -> r
     return results.RowRecord(
         facts=row.facts,
         name=row.name,
-        experiment=row.name.removeprefix("BL-").removeprefix("ED-"),
-        model=row.facts.family,
         label=row.label,
-        inputs=row.window.inputs,
-        step_frames=row.scored_window.step_frames,
-        horizon_steps=row.scored_window.horizon_steps,
-        sensors=row.sensors,
-        translate=row.translate,
         results=tuple(found),
         failure=failures[0] if failures else (None if done else results.NOT_RUN),
     )

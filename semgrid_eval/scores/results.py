@@ -126,15 +126,8 @@ class RowRecord(Config):
     """One row of the matrix; a failed row has a reason instead of results."""
 
     facts: RowFacts
-    name: str  # unique in the run, e.g. "ED-DC"
-    experiment: str  # "DC", "NT", "Sp2", "PH3", ...
-    model: str  # "ED", "BL", ...
+    name: str  # unique in the run
     label: str  # for readers: name and what it does
-    inputs: int
-    step_frames: int
-    horizon_steps: int
-    sensors: tuple[str, ...]
-    translate: bool
     results: tuple[str, ...] = ()
     failure: str | None = None
 

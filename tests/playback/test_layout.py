@@ -1,23 +1,14 @@
 import re
 
 import pytest
+from support.fake_run import facts
 
 from semgrid_eval.playback.layout import prediction_topic, viewer_layout
 from semgrid_eval.scores.results import RowRecord
 
 
 def row(name="ED-DC", sensors=("full",)):
-    return RowRecord(
-        name=name,
-        experiment="DC",
-        model="ED",
-        label=name,
-        inputs=2,
-        step_frames=5,
-        horizon_steps=1,
-        sensors=sensors,
-        translate=True,
-    )
+    return RowRecord(facts=facts("ED", sensors), name=name, label=name)
 
 
 def panels(node):

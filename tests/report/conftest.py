@@ -49,8 +49,8 @@ def troubled(tmp_path_factory) -> Path:
     run = make_fake_run(tmp_path_factory.mktemp("runs") / "run", recordings=2, windows=1, rows=(*kinds, failed))
     record = read_run(run)
     hostile = tuple(
-        row.model_copy(update={"name": name, "label": name, "experiment": f"{i} {name}", "sensors": (name,)})
-        for i, (row, name) in enumerate(zip(record.rows, HOSTILE, strict=False))
+        row.model_copy(update={"name": name, "label": name, "facts": row.facts.model_copy(update={"sensors": (name,)})})
+        for row, name in zip(record.rows, HOSTILE, strict=False)
     )
     (result_folder(run, record.rows[4].results[0]) / "sums.npz").write_bytes(b"not a zip")
     rows, broken = (*hostile, *record.rows[4:]), {name: name for name in HOSTILE}

@@ -25,18 +25,38 @@ HOSTILE = ("<script>alert(1)</script>", "\"quoted\" & 'more'", "{{ 7 * 7 }} $x_1
 
 @dataclass(frozen=True)
 class FakeRow:
-    experiment: str
-    model: str
+    what: str
+    family: str
     wrong: float = 0.0  # share of wrongly predicted cells of a trained model
     seeds: int = 0  # 0: the predictor does not depend on chance
     sensors: tuple[str, ...] = ("front",)
     translate: bool = True
     horizon_steps: int = 1
     failure: str | None = None
+    inputs: int = 2  # on record; there are two
+    baseline: bool | None = None  # `BL` are, if not said otherwise
+    learns: bool | None = None  # what is not a baseline does, if not said otherwise
+    cell_m: float = 0.78125  # of a grid with other cells, other targets
 
     @property
     def name(self) -> str:
-        return f"{self.model}-{self.experiment}"
+        return f"{self.family}-{self.what}"
+
+    @property
+    def facts(self) -> results.RowFacts:
+        found = facts(self.family, self.sensors, self.horizon_steps, translate=self.translate)
+        baseline = found.baseline if self.baseline is None else self.baseline
+        model = {"BL-Fuse": "fuse", "BL-DC": "newest", "BL-NT": "newest"}.get(self.name, self.family.lower())
+        learns = not baseline if self.learns is None else self.learns
+        changes = {"baseline": baseline, "learns": learns, "model": model, "inputs": self.inputs}
+        return found.model_copy(update=changes)
+
+    @property
+    def config(self) -> dict[str, object]:
+        config: dict[str, object] = {"model": self.facts.model, "sensors": list(self.sensors)}
+        config |= {"translate": self.translate, "window": {"horizon_steps": self.horizon_steps, "inputs": self.inputs}}
+        config |= {"grid": {"cell_m": self.cell_m}, "settings": {"depth": 3} if self.seeds else {}}
+        return config
 
 
 ROWS = (
@@ -122,19 +142,7 @@ def counted_row(
         predict_seconds=window_ms * len(windows) / 1000,
         parameters=None,
     )
-    model, experiment = name.split("-", 1)
-    row = results.RowRecord(
-        facts=facts(model),
-        name=name,
-        experiment=experiment,
-        model=model,
-        label=name,
-        inputs=2,
-        step_frames=5,
-        horizon_steps=1,
-        sensors=("front",),
-        translate=True,
-    )
+    row = results.RowRecord(facts=record.facts, name=name, label=name)
     sums = {("iou", "all"): counts[:, None]}
     if near:
         sums["iou", "actors"] = np.stack([_hit_counts(near[region], cells) for region in ("moving", "standing")], 1)
@@ -204,21 +212,14 @@ class _Maker:
         ids: tuple[str, ...] = ()
         if row.failure is None:
             inputs = self._inputs(row)
-            windows_id = digest_value([row.experiment, len(self.records), self.names])
+            windows_id = digest_value([row.what, len(self.records), self.names])
             arrays = {"inputs": inputs, "target": self.target, "mask": self.mask}
             results.write_arrays(results.windows_file(self.run, windows_id), arrays)
             ids = tuple(self._result(row, seed, inputs, windows_id) for seed in range(max(1, row.seeds)))
         return results.RowRecord(
-            facts=facts(row.model, row.sensors, row.horizon_steps, translate=row.translate),
+            facts=row.facts,
             name=row.name,
-            experiment=row.experiment,
-            model=row.model,
-            label=f"{row.name}: {'network' if row.model == 'ED' else 'model-driven baseline'}",
-            inputs=2,
-            step_frames=5,
-            horizon_steps=row.horizon_steps,
-            sensors=row.sensors,
-            translate=row.translate,
+            label=f"{row.name}: {'model-driven baseline' if row.facts.baseline else 'network'}",
             results=ids,
             failure=row.failure,
         )
@@ -233,19 +234,16 @@ class _Maker:
 
     def _predict(self, row: FakeRow, seed: int, inputs: Grid) -> tuple[Grid, Grid]:
         newest = inputs[:, :, -1].max(axis=1)
-        if row.model == "ED":
-            return _guess(np.random.default_rng([11, seed, len(row.experiment)]), row, self.truth)
+        if not row.facts.baseline:
+            return _guess(np.random.default_rng([11, seed, len(row.what)]), row, self.truth)
         older = inputs[:, :, 0].max(axis=1)
-        fused = np.where(newest == UNKNOWN, older, newest) if row.experiment == "Fuse" else newest
+        fused = np.where(newest == UNKNOWN, older, newest) if row.what == "Fuse" else newest
         return fused, np.full_like(fused, 255)
 
     def _result(self, row: FakeRow, seed: int, inputs: Grid, windows_id: str) -> str:
         prediction, certainty = self._predict(row, seed, inputs)
         trained = row.seeds > 0
-        experiment = row.experiment if row.horizon_steps == 1 else "DC"
-        config = {"model": row.model, "experiment": experiment, "depth": 3 if trained else None}
-        config["window"] = {"horizon_steps": row.horizon_steps}
-        result_id = digest_value([config, seed, self.names])
+        result_id = digest_value([row.name, row.config, seed, self.names])
         folder = results.result_folder(self.run, result_id)
         results.write_arrays(folder / "predictions.npz", {"prediction": prediction, "certainty": certainty})
         scored = ScoredWindows(self.target, prediction, certainty, self.mask, inputs, self.actors, GridSpec())
@@ -255,10 +253,10 @@ class _Maker:
         record = results.ResultRecord(
             format_version=results.FORMAT_VERSION,
             id=result_id,
-            facts=facts(row.model, row.sensors, row.horizon_steps, translate=row.translate),
-            targets=digest_value(self.names),
+            facts=row.facts,
+            targets=digest_value([self.names, len(self.records), row.cell_m]),
             lead_s=0.294118 * row.horizon_steps,
-            config=config,
+            config=row.config,
             log_digests=tuple(digest_value(n) for n in self.names),
             seed=seed if trained else None,
             windows_id=windows_id,

@@ -2,7 +2,7 @@
 
 import itertools
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -49,11 +49,12 @@ class Check:
         }
         return weights | ({} if self.over is None else {self.over[0]: -1.0, self.over[1]: 1.0})
 
-    def text(self, named: Callable[[str], str]) -> str:
-        """The comparison in names of rows, given what a row is called where it has another name."""
-        texts = [f"{named(first)} \N{MINUS SIGN} {named(second)}" for first, second in self.pairs]
+    @property
+    def text(self) -> str:
+        """The comparison in names of rows."""
+        texts = [f"{first} \N{MINUS SIGN} {second}" for first, second in self.pairs]
         if self.over is not None:
-            return f"({texts[0]}) \N{MINUS SIGN} ({named(self.over[0])} \N{MINUS SIGN} {named(self.over[1])})"
+            return f"({texts[0]}) \N{MINUS SIGN} ({self.over[0]} \N{MINUS SIGN} {self.over[1]})"
         return texts[0] if len(texts) == 1 else f"mean of {', '.join(texts)}"
 
 
@@ -132,7 +133,7 @@ def _horizons() -> tuple[Claim, ...]:
 
 
 def _builds(builds: list[tuple[str, int, int]]) -> tuple[Claim, ...]:
-    """Compare the deepest with the shallowest networks of equal width, and the widest with the narrowest alike."""
+    """Compare the deepest with the shallowest networks of equal width, and likewise the widest with the narrowest."""
     found = []
     for kind, varied, fixed in (("deeper", 1, 2), ("wider", 2, 1)):
         groups: dict[object, list[tuple[str, int, int]]] = {}

@@ -1,6 +1,5 @@
 """What a run says about the paper's claims: each one holds, does not hold, stays undecided or was not run."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -11,10 +10,11 @@ import pandas as pd
 
 from semgrid_eval.report.claims.claims import MARGIN, WINDOW_MS, Check, Claim, Rule, claims
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores, Scores, weighted_sum
-from semgrid_eval.report.rows.load import Row, Run
+from semgrid_eval.report.rows.load import Run, comparable
 from semgrid_eval.report.tables.table import ABSENT, MINUS, Cell, Line, Table, difference_cell, interval_phrase, plural
 
 TRUTH = "logs that tell where true actors move"
+SAME_TARGETS = "rows with the same targets"
 
 
 class Verdict(StrEnum):
@@ -37,7 +37,6 @@ class Outcome:
     verdict: Verdict
     difference: Estimate
     windows: int
-    text: str
     missing: tuple[str, ...] = ()
 
 
@@ -73,7 +72,7 @@ def find(runs: Sequence[Run], scores: Scores, regions: Mapping[str, Scores]) -> 
 
 
 def judge(rule: Rule, difference: Estimate) -> Verdict:
-    """Hold the interval of a difference against a rule; without an interval nothing is decided."""
+    """Apply a rule to the interval of a difference; without an interval nothing is decided."""
     low, high = difference.low, difference.high
     holds, fails = {
         "better": (low > 0, high < 0),
@@ -153,34 +152,30 @@ def _tag(findings: Sequence[Finding]) -> str:
 
 
 def _by_record(scores: Scores, run: Run) -> dict[str, RowScores]:
-    """Find a run's rows by the names that presets give them: the row's own, else the one of its model and experiment.
-
-    Where several rows are of one model and experiment, nobody knows which of them a claim is about.
-    """
-    rows_of = Counter(_kind(row) for row in run.rows)
-    mine = [entry for entry in scores.values() if entry.row.run == run.folder]
-    found = {_kind(entry.row): entry for entry in mine if rows_of[_kind(entry.row)] == 1}
-    return found | {entry.row.record.name: entry for entry in mine}
-
-
-def _kind(row: Row) -> str:
-    return f"{row.record.model}-{row.record.experiment}"
+    """Find a run's rows by their names in its matrix, which the claims go by."""
+    return {entry.row.record.name: entry for entry in scores.values() if entry.row.run == run.folder}
 
 
 def _outcome(check: Check, places: Mapping[str, Scores]) -> Outcome:
     rows = places.get(check.region, {})
-    text = check.text(lambda name: places[""][name].row.record.name if name in places[""] else name)
-    missing = tuple(name for name in check.weights if name not in places[""])
-    if not missing and any(name not in rows for name in check.weights):
-        missing = (TRUTH,)
-    if missing:
-        return Outcome(check, Verdict.NOT_RUN, Estimate(np.nan, np.nan, np.nan), 0, text, missing)
+    if missing := _missing(check, places[""], rows):
+        return Outcome(check, Verdict.NOT_RUN, Estimate(np.nan, np.nan, np.nan), 0, missing)
     if check.score == WINDOW_MS:
         difference = _time_difference(check, rows)
     else:
         difference = weighted_sum([(weight, rows[name]) for name, weight in check.weights.items()], check.score)
     windows = min(rows[name].windows for name in check.weights)
-    return Outcome(check, judge(check.rule, difference), difference, windows, text)
+    return Outcome(check, judge(check.rule, difference), difference, windows)
+
+
+def _missing(check: Check, scored: Scores, near: Scores) -> tuple[str, ...]:
+    """Name what a comparison lacks: rows, the truth about actors, or equal targets."""
+    if missing := tuple(name for name in check.weights if name not in scored):
+        return missing
+    if any(name not in near for name in check.weights):
+        return (TRUTH,)
+    first, *others = (scored[name].row for name in check.weights)
+    return () if all(comparable(first, other) for other in others) else (SAME_TARGETS,)
 
 
 def _time_difference(check: Check, rows: Scores) -> Estimate:
@@ -199,13 +194,15 @@ def _line(outcome: Outcome) -> Line:
     check, difference = outcome.check, outcome.difference
     if outcome.missing:
         needs = Cell(f"needs {', '.join(outcome.missing)}")
-        return Line(outcome.text, (_verdict_cell(outcome.verdict), needs, Cell(ABSENT)), "part")
+        return Line(outcome.check.text, (_verdict_cell(outcome.verdict), needs, Cell(ABSENT)), "part")
     if check.score == WINDOW_MS:
-        return Line(outcome.text, (_verdict_cell(outcome.verdict), Cell("ms a window"), _time_cell(difference)), "part")
+        return Line(
+            outcome.check.text, (_verdict_cell(outcome.verdict), Cell("ms a window"), _time_cell(difference)), "part"
+        )
     label = LABELS[check.score] + (f", {check.region}" if check.region else "")
     title = f"{interval_phrase(difference, with_sign=True)}; {plural(outcome.windows, 'window')}"
     number = difference_cell(difference, title=title)
-    return Line(outcome.text, (_verdict_cell(outcome.verdict), Cell(label), number), "part")
+    return Line(outcome.check.text, (_verdict_cell(outcome.verdict), Cell(label), number), "part")
 
 
 def _time_cell(difference: Estimate) -> Cell:
@@ -220,7 +217,7 @@ def _verdict_cell(found: Verdict) -> Cell:
 def _values(outcome: Outcome) -> dict[str, Any]:
     check, difference = outcome.check, outcome.difference
     return {
-        "comparison": outcome.text.replace(MINUS, "-"),
+        "comparison": outcome.check.text.replace(MINUS, "-"),
         "score": check.score,
         "region": check.region or "all",
         "rule": check.rule,

@@ -1,4 +1,4 @@
-"""The paper's class-wise table (supplement, Table A1) and its training, to stand beside a run's."""
+"""The paper's class-wise table (supplement, Table A1) and its training, for comparison with a run."""
 
 from functools import cache
 from importlib import resources
@@ -24,6 +24,16 @@ PAPER_DATASET = "cityscapes"
 PAPER_REPEATS = 20
 PAPER_WINDOWS = 500
 """One for each sequence of Cityscapes' validation set."""
+
+
+def in_paper(name: str) -> bool:
+    """Tell whether the paper's table has a row of that name."""
+    return name in paper_table()
+
+
+def paper_value(name: str, column: str) -> float:
+    """Return the paper's value of a class or category for a row of that name, NaN where it has none."""
+    return paper_table().get(name, {}).get(column, np.nan)
 
 
 @cache

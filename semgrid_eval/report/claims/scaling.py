@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Sequence
 
-from semgrid_eval.report.claims.paper import PAPER_DATASET, PAPER_REPEATS, PAPER_SETTINGS, PAPER_WINDOWS, paper_table
+from semgrid_eval.report.claims.paper import PAPER_DATASET, PAPER_REPEATS, PAPER_SETTINGS, PAPER_WINDOWS, in_paper
 from semgrid_eval.report.rows.load import Row, Run
 
 
 def scaling(run: Run) -> str:
-    """State in what the rows that the paper has, too, are trained otherwise; empty where none of them is trained."""
-    rows = [row for row in run.rows if row.results and row.record.name in paper_table()]
+    """Say how the training of rows that the paper has, too, differs from the paper's; empty if none was trained."""
+    rows = [row for row in run.rows if row.results and in_paper(row.record.name)]
     trained = [row for row in rows if row.results[0].record.seed is not None]
     if not trained:
         return ""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.estimates.resampling import DRAWS, Draws, Resampling
 from semgrid_eval.report.estimates.sums import RegionSums, row_sums
-from semgrid_eval.report.rows.load import Result, Row
+from semgrid_eval.report.rows.load import Result, Row, comparable
 from semgrid_eval.scores.metrics import iou
 from semgrid_eval.scores.metrics.metric import Counts, Floats, Metric, column_names, mean_finite
 from semgrid_eval.scores.metrics.table import IOU, METRICS
@@ -92,11 +92,6 @@ Parts = Mapping[str, Scores]
 """Scores by the name of the region."""
 Everything = Mapping[str, Mapping[str, Parts]]
 """Scores by the names of metric, division and region."""
-
-
-def comparable(first: Row, second: Row) -> bool:
-    """Tell whether rows are scored on the same targets, so that their scores may be subtracted."""
-    return first.targets == second.targets
 
 
 def weighted_sum(parts: Sequence[tuple[float, RowScores]], column: str) -> Estimate:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.report.estimates.division import Division, of_windows
-from semgrid_eval.report.examples.kept import Glimpses
+from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import Result, Row, Run
 from semgrid_eval.scores.thumbnails import Track
 
@@ -22,7 +22,7 @@ _WORDS = "by the vehicle's speed from newest input to target"
 
 def paces(runs: Sequence[Run]) -> Division:
     """Divide windows by pace, as far as runs kept what they know of their logs."""
-    kept = {run.folder: Glimpses(run) for run in runs}
+    kept = {run.folder: RunThumbnails(run) for run in runs}
     shared: dict[tuple[Path, str], NDArray[np.int64]] = {}
 
     def number(row: Row, result: Result) -> NDArray[np.int64]:
@@ -40,7 +40,7 @@ def mean_speed_mps(track: Track, from_ns: int, to_ns: int) -> float:
     return float(np.hypot(x_m[1] - x_m[0], y_m[1] - y_m[0]) / ((to_ns - from_ns) * 1e-9))
 
 
-def _paces(result: Result, kept: Glimpses) -> NDArray[np.int64]:
+def _paces(result: Result, kept: RunThumbnails) -> NDArray[np.int64]:
     """Number the pace of each window: (N,), -1 where nothing is known of the drive."""
     found = np.full(len(result.record.windows), -1, np.int64)
     for i, window in enumerate(result.record.windows):

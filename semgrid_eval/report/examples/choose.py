@@ -1,6 +1,7 @@
 """Example windows, chosen by a rule: where a model most outperforms its baselines, and where it loses most.
 
-The rule is the supplement's: min(IoU_ED-DC - IoU_BL-DC, IoU_ED-DC - IoU_BL-NT), for one class or over all of them.
+The rule is the supplement's: the smaller of a model's leads over its baseline on moved and on unmoved inputs, for one
+class or over all of them.
 """
 
 from collections.abc import Sequence
@@ -10,14 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, KNOWN_IDS
-from semgrid_eval.report.rows.load import Result, Row, key_of
+from semgrid_eval.report.rows.load import Result, Row, comparable, key_of
 from semgrid_eval.report.rows.pairing import Headline, reference_of
+from semgrid_eval.report.rows.settings import settings_but
 from semgrid_eval.scores.metrics.iou import class_iou
 from semgrid_eval.scores.metrics.metric import mean_finite
 from semgrid_eval.scores.results import WindowRecord
 
 MIN_CELLS = 10
 """A class counts in the choice of windows only where the target has at least this many of its cells."""
+
+_MOST_RIVALS = 2
 
 Array = NDArray[np.float64]
 
@@ -60,21 +64,18 @@ class Pick:
 
 
 def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
-    """Choose who is measured against whom: ED-DC against BL-DC and BL-NT where they exist, then the other trained rows.
+    """Choose who is measured against whom: the best model that is not a baseline first, then the other such rows.
 
-    Without a trained row, the best row is measured against the other baselines; alone, against nobody.
+    The first is measured against its baseline and against that baseline on inputs that are not moved, where there is
+    one; then against itself where it looks further ahead. Without such a row, the best baseline is measured against
+    another one; alone, against nobody.
     """
     if headline is None:
         return []
-    trained = (row for row in (headline.best, headline.rival) if row is not None and not row.is_baseline)
-    main = _row(rows, headline.best, "ED", "DC") or next(trained, headline.best)
-    named = [_row(rows, main, "BL", "DC"), _row(rows, main, "BL", "NT")]
-    rivals = [row for row in named if row is not None and row != main] or _default_rivals(main, rows, headline)
-    others = [(row, reference_of(row, rows)) for row in rows if not row.is_baseline and row != main]
-    found = [Contest(main, tuple(rivals))]
-    later = sorted((row for row in rows if _asks_later(row, main)), key=lambda row: row.record.horizon_steps)
-    if later:
+    found = [Contest(main := _main(headline), tuple(_rivals(main, rows, headline)))]
+    if later := _looking_further(main, rows):
         found.append(Contest(main, tuple(later), tuple(reference_of(row, rows) for row in (main, *later))))
+    others = [(row, reference_of(row, rows)) for row in rows if not row.is_baseline and row != main]
     return found + [Contest(row, (reference,)) for row, reference in others if reference is not None]
 
 
@@ -138,29 +139,39 @@ def _aligned_iou(result: Result, other: Result) -> Array:
     return np.asarray(padded[places])
 
 
-def _asks_later(row: Row, main: Row) -> bool:
-    """Tell whether a row is the same model asked to look further ahead, at the same target frames."""
-    further = row.record.horizon_steps > main.record.horizon_steps
-    return further and row.run == main.run and _but_horizon(row) == _but_horizon(main)
+def _main(headline: Headline) -> Row:
+    """Return the best row of the main group that is not a baseline, the best one where all are."""
+    models = (row for row in (headline.best, headline.rival) if row is not None and not row.is_baseline)
+    return next(models, headline.best)
 
 
-def _but_horizon(row: Row) -> dict[str, object]:
-    """Return what determined a row's numbers, but how far it looks ahead."""
-    return {key: value for key, value in row.shown.settings.items() if not key.endswith("horizon_steps")}
-
-
-def _row(rows: Sequence[Row], like: Row, model: str, experiment: str) -> Row | None:
-    wanted = f"{model}-{experiment}"
-    return next((row for row in rows if row.record.name == wanted and row.run == like.run), None)
-
-
-def _default_rivals(main: Row, rows: Sequence[Row], headline: Headline) -> list[Row]:
+def _rivals(main: Row, rows: Sequence[Row], headline: Headline) -> list[Row]:
     reference = reference_of(main, rows)
-    if reference is not None:
-        return [reference]
-    return [row for row in (headline.best, headline.rival) if row is not None and row != main][:1] or [
-        row for row in rows if row != main and row.run == main.run and row.is_baseline
-    ][:1]
+    if reference is None:
+        pair = (headline.best, headline.rival)
+        return [row for row in pair if row is not None and row != main][:1]
+    return [reference, *(row for row in rows if _is_untranslated_twin(row, reference))][:_MOST_RIVALS]
+
+
+def _is_untranslated_twin(row: Row, reference: Row) -> bool:
+    """Tell whether a row is the reference but for its inputs, which are not moved to the target's time."""
+    untranslated = reference.record.facts.model_copy(update={"translate": False})
+    same = row.run == reference.run and comparable(row, reference)
+    return same and row != reference and row.record.facts == untranslated
+
+
+def _looking_further(main: Row, rows: Sequence[Row]) -> list[Row]:
+    """List the rows that are the main one but for a longer horizon, at the same targets: the nearest first."""
+    mine = settings_but(main, "horizon_steps")
+    found = [
+        row
+        for row in rows
+        if row.run == main.run
+        and comparable(row, main)
+        and row.record.facts.horizon_steps > main.record.facts.horizon_steps
+        and settings_but(row, "horizon_steps") == mine
+    ]
+    return sorted(found, key=lambda row: row.record.facts.horizon_steps)
 
 
 def _ordered(values: Array) -> NDArray[np.intp]:

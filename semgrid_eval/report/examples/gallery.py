@@ -6,14 +6,13 @@ from functools import lru_cache
 
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.report.examples.choose import Contest, Pick, choose, choose_by_class, contests
-from semgrid_eval.report.examples.kept import Glimpses
 from semgrid_eval.report.examples.panels import Example, Shown, draw_examples
+from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import Row, Run, WindowReader
 from semgrid_eval.report.rows.pairing import Headline
 from semgrid_eval.scores.results import read_windows
 
 _BEST, _WORST, _OTHER = 3, 3, 1
-_AHEAD = "Looking further ahead"
 
 
 @dataclass(frozen=True)
@@ -24,6 +23,7 @@ class Group:
         hint: what is special about it.
         rule: by which its windows were chosen.
         seed: of the predictions shown.
+        looks_ahead: whether its rows look ahead differently far.
         shown: whether the group is open when the page is opened.
     """
 
@@ -33,6 +33,7 @@ class Group:
     seed: int | None
     windows: tuple[Example, ...]
     problem: str
+    looks_ahead: bool = False
     shown: bool = False
 
 
@@ -41,7 +42,7 @@ def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | N
     chosen = contests(rows, found)
     if not chosen:
         return []
-    kept = {run.folder: Glimpses(run) for run in runs}
+    kept = {run.folder: RunThumbnails(run) for run in runs}
     main, *others = chosen
     plans = [
         {"": choose(main, best=_BEST, worst=_WORST), ", class by class": choose_by_class(main)},
@@ -57,14 +58,14 @@ def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | N
 
 
 def groups_of(
-    contest: Contest, plan: Mapping[str, Sequence[Pick]], glimpses: Glimpses, read: WindowReader = read_windows
+    contest: Contest, plan: Mapping[str, Sequence[Pick]], thumbnails: RunThumbnails, read: WindowReader = read_windows
 ) -> list[Group]:
     """Draw the chosen windows of a contest, a group for each end of its title; what cannot be read is their problem."""
     windows: dict[str, tuple[Example, ...]] = dict.fromkeys(plan, ())
     problem = ""
     try:
         shown = Shown(contest, {pick.index for picks in plan.values() for pick in picks}, read)
-        windows = {end: tuple(draw_examples(shown, picks, glimpses)) for end, picks in plan.items()}
+        windows = {end: tuple(draw_examples(shown, picks, thumbnails)) for end, picks in plan.items()}
     except (SemgridError, ValueError, IndexError) as error:
         problem = f"The pictures of {contest.model.name} cannot be shown: {error}"
     return [
@@ -75,6 +76,7 @@ def groups_of(
             seed=contest.result.record.seed,
             windows=windows[end],
             problem=problem if picks else "No window has enough cells of any class.",
+            looks_ahead=bool(contest.baselines),
         )
         for end, picks in plan.items()
     ]
@@ -85,10 +87,10 @@ def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
     if not groups:
         return []
     said = []
-    if not any(len(row.record.sensors) > 1 for row in rows):
+    if not any(len(row.record.facts.sensors) > 1 for row in rows):
         said.append("No row has several sensors, so there is no example with a blind band.")
-    if not any(group.title.startswith(_AHEAD) for group in groups):
-        said.append("The model was not run with several horizons, so there is no example of them in a row.")
+    if not any(group.looks_ahead for group in groups):
+        said.append("The model shown first was not run with several horizons, so there is no example of them in a row.")
     shown = [window for group in groups for window in group.windows]
     pictures = [picture for window in shown for column in window.film for picture in column.pictures]
     if shown and not any(picture.kind == "camera" for picture in pictures):
@@ -108,7 +110,7 @@ def widths(rows: Sequence[Row]) -> str:
 def _title(contest: Contest) -> str:
     names = [contest.model.name, *(rival.name for rival in contest.rivals)]
     if contest.baselines:
-        return f"{_AHEAD}: {', '.join(names)}"
+        return f"Looking further ahead: {', '.join(names)}"
     return names[0] + (f" against {' and '.join(names[1:])}" if names[1:] else "")
 
 
@@ -124,6 +126,6 @@ def _hint(contest: Contest, windows: Sequence[Example]) -> str:
             "of an input does. It is taken as flat, so walls and vehicles may reach into it. What a model says there "
             "it has learned."
         )
-    if len(contest.model.record.sensors) > 1:
+    if len(contest.model.record.facts.sensors) > 1:
         return "Each input is seen by several sensors; the target comes from the whole image."
     return ""

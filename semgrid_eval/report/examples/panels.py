@@ -18,7 +18,7 @@ from semgrid_eval.report.examples.drawing import (
     grid_picture,
     right_png,
 )
-from semgrid_eval.report.examples.kept import Glimpses, times
+from semgrid_eval.report.examples.thumbnails import RunThumbnails, times
 from semgrid_eval.report.rows.load import Row, WindowReader, key_of
 from semgrid_eval.report.tables.table import ABSENT, number, plural, signed
 from semgrid_eval.scores.results import read_predictions, read_windows
@@ -124,7 +124,7 @@ class Shown:
 
     def _inputs(self, i: int, view: View) -> Iterator[Column]:
         model = self.contest.model
-        inputs, names = self._seen[model.name][i]["inputs"], model.record.sensors
+        inputs, names = self._seen[model.name][i]["inputs"], model.record.facts.sensors
         sensors, steps = inputs.shape[:2]
         for t in range(steps):
             title, stamp_ns = f"Input {t + 1} of {steps}", view.input_stamp_ns(steps - 1 - t)
@@ -139,13 +139,13 @@ class Shown:
                 continue
             inputs = self._seen[row.name][i]["inputs"][:, -1]  # (S, H, W)
             title = f"Newest input of {row.name}"
-            names = row.record.sensors if len(inputs) > 1 else ("",)
+            names = row.record.facts.sensors if len(inputs) > 1 else ("",)
             grids = [_input_picture(grid, title, name, lead=False) for grid, name in zip(inputs, names, strict=True)]
             grids.append(self._prediction(row, i, f"{row.name}{self._iou(row, i)}"))
             if baseline is not None and i in self._answers[baseline.name]:
                 title = f"{baseline.name}{self._iou(baseline, i)}"
                 grids.append(self._prediction(baseline, i, title, lead=False))
-            title = f"{plural(row.record.horizon_steps, 'step')} ahead"
+            title = f"{plural(row.record.facts.horizon_steps, 'step')} ahead"
             stamps = row.shown.record.windows[row.shown.places[key_of(self._windows[i])]].input_stamps_ns
             stamp_ns = stamps[-1] if stamps else None
             yield Column(title, view.before(stamp_ns), (*view.photos(stamp_ns, title), *grids))
@@ -170,14 +170,14 @@ class Shown:
         }
 
 
-def draw_examples(shown: Shown, picks: Sequence[Pick], glimpses: Glimpses) -> Iterator[Example]:
+def draw_examples(shown: Shown, picks: Sequence[Pick], thumbnails: RunThumbnails) -> Iterator[Example]:
     """Draw the chosen windows of a contest, each window once."""
     contest, result = shown.contest, shown.contest.result
     for group in by_window(picks):
         index = group[0].index
         window = result.record.windows[index]
-        kept = glimpses.of(window.log, result)
-        view = View(window, kept, result.grid, contest.model.record.sensors)
+        kept = thumbnails.of(window.log, result)
+        view = View(window, kept, result.grid, contest.model.record.facts.sensors)
         film = tuple(shown.film(index, view))
         answers = tuple(shown.answers(index))
         hatching = view.hatching
@@ -187,7 +187,7 @@ def draw_examples(shown: Shown, picks: Sequence[Pick], glimpses: Glimpses) -> It
             log=window.log,
             frame=window.target_frame,
             times=times(window.target_stamp_ns, kept),
-            command=glimpses.command(contest.model, window),
+            command=thumbnails.command(contest.model, window),
             film=film,
             answers=answers,
             legend=_legend([*film, *answers], {HATCHED} if hatching else set()),

@@ -1,173 +1,142 @@
-"""The paper's Fig. 5: category scores of every experiment as bars, with intervals and the paper's own values."""
+"""Category scores of every row as bars, grouped by question, with intervals and the paper's own values (its Fig. 5)."""
 
-import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from semgrid_eval.classes import CATEGORY_NAMES
-from semgrid_eval.report.claims.paper import paper_table
+from semgrid_eval.report.claims.paper import paper_value
 from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
 from semgrid_eval.report.figures.style import (
     INK,
     MUTED,
-    PALETTE,
     PAPER_MARKS,
-    RULE,
     SETTINGS,
     Plot,
     evidence,
+    family_colours,
     finish,
     paper_note,
     short,
 )
+from semgrid_eval.report.rows.load import Row
+from semgrid_eval.report.rows.pairing import by_question
 
-_GROUPS = {"Sp": "SF: sensors fused", "SL": "SL: inputs", "PH": "PH: horizon"}
-_GROUP = re.compile(r"(Sp|SL|PH)\d")
-_GAP = 0.5  # between groups, in bars' places
-_WIDEST_IN, _HALF_IN, _SQUEEZED_IN = 11.3, 5.5, 6.6
-"""Widths: all of the page, half of it, and how wide a figure may be to be squeezed into that half."""
-_LABEL_SHARE = 0.09  # of a panel's height, that a number above a bar takes
+_GAP = 1.0  # between questions, in bars' places; the words of a question stand in it
+_BAR_IN, _AROUND_IN = 0.19, 0.75  # height of a bar's place, and of title, legend and axis together
+_WIDE_IN = 11.3  # all of the page
+_ROOM = 1.2  # width of a panel by its longest bar, which leaves room for the numbers
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Where each experiment stands on the axis, group by group, and the colour of each model."""
+class Group:
+    """The rows of one question, baselines first: where each stands, downwards, and the question in words."""
 
+    words: str
     places: dict[str, float]
-    groups: dict[str, list[str]]
-    colours: dict[str, str]
-
-    @property
-    def models(self) -> int:
-        """The number of models, by which bars get their width."""
-        return len(self.colours)
 
 
 def category_plots(scores: Scores) -> list[Plot]:
-    """Draw the four panels of Fig. 5, one figure each."""
-    return [category_plot(scores, (name,), f"category_{name}") for name in CATEGORY_NAMES] if scores else []
-
-
-def category_overview(scores: Scores) -> list[Plot]:
-    """Draw the four panels in one figure."""
-    return [category_plot(scores, CATEGORY_NAMES, "categories")] if scores else []
-
-
-def lay_out(scores: Scores) -> Layout:
-    """Put experiments in the order of the matrix, the paper's groups SF, SL and PH together, baselines first."""
-    groups: dict[str, list[str]] = {}
-    for experiment in dict.fromkeys(_experiment(entry) for entry in scores.values()):
-        found = _GROUP.match(experiment)
-        groups.setdefault(_GROUPS[found[1]] if found else "", []).append(experiment)
-    places = {
-        name: at + _GAP * number
-        for at, (number, name) in enumerate((n, name) for n, names in enumerate(groups.values()) for name in names)
-    }
-    models = dict.fromkeys(e.row.record.model for e in sorted(scores.values(), key=lambda e: not e.row.is_baseline))
-    return Layout(places, groups, {model: PALETTE[i % len(PALETTE)] for i, model in enumerate(models)})
-
-
-def category_plot(scores: Scores, categories: Sequence[str], name: str) -> Plot:
-    """Draw a panel for each of the categories, two to a line."""
-    layout = lay_out(scores)
-    natural_in = max(4.6, 1.2 + 0.36 * len(layout.places) * layout.models)
-    width_in = min(natural_in, _WIDEST_IN if natural_in > _SQUEEZED_IN else _HALF_IN)
-    columns = min(2, len(categories))
-    lines = -(-len(categories) // columns)
+    """Draw a panel for each category side by side in one figure, which names the rows once."""
+    if not scores:
+        return []
+    groups = lay_out(scores)
+    places = [place for group in groups for place in group.places.values()]
+    size_in = (_WIDE_IN, _AROUND_IN + _BAR_IN * (max(places) + 1 + _GAP))
     with mpl.rc_context(SETTINGS):
-        figure = Figure(figsize=(width_in * columns, 2.7 * lines), layout="constrained")
-        for axes, category in zip(np.atleast_1d(figure.subplots(lines, columns)).ravel(), categories, strict=True):
-            _panel(axes, scores, category, layout)
-        words = ", ".join(LABELS[category].lower() for category in categories)
-        caption = f"IoU of {words} by experiment ({evidence(scores)}); lines are 95% intervals{paper_note(scores)}"
-        return finish(figure, name, "summary.csv", caption)
+        figure = Figure(figsize=size_in, layout="constrained")
+        panels = figure.subplots(1, len(CATEGORY_NAMES), sharey=True)
+        for axes, category in zip(panels, CATEGORY_NAMES, strict=True):
+            _panel(axes, scores, category, groups)
+        _name_rows(panels[0], groups)
+        _legend(figure, scores)
+        caption = f"Category IoU by row ({evidence(scores)}). Rows that answer the same question stand together;"
+        return [finish(figure, "categories", "summary.csv", f"{caption} lines are 95% intervals{paper_note(scores)}")]
 
 
-def _panel(axes: Axes, scores: Scores, category: str, layout: Layout) -> None:
-    wide, models = 0.8 / layout.models, list(layout.colours)
-    label_iou = _LABEL_SHARE * _highest(scores, category)
-    for experiment, place in layout.places.items():
-        entries = [entry for entry in scores.values() if _experiment(entry) == experiment]
-        entries.sort(key=lambda entry: models.index(entry.row.record.model))
-        for at, entry in enumerate(entries):
-            middle = place + (at - (len(entries) - 1) / 2) * wide
-            _bar(axes, entry, category, middle, wide, layout.colours[entry.row.record.model])
-            _number(axes, entry, category, middle, label_iou)
-    for name, experiments in layout.groups.items():
-        first, last = (layout.places[end] for end in (experiments[0], experiments[-1]))
-        if name and len(layout.groups) > 1:
-            axes.annotate(
-                name,
-                ((first + last) / 2, 0),
-                (0, -24),
-                xycoords=("data", "axes fraction"),
-                textcoords="offset points",
-                ha="center",
-                color=MUTED,
-                fontsize=7.5,
-            )
-        if first > 0:
-            axes.axvline(first - (1 + _GAP) / 2, color=RULE, linewidth=0.8)
-    axes.set_xticks(list(layout.places.values()), [short(name) for name in layout.places])
-    axes.tick_params(axis="x", length=0)
+def lay_out(scores: Scores) -> list[Group]:
+    """Put the rows of each question together, baselines first, questions in the order of the matrix."""
+    groups, at = [], 0.0
+    questions = by_question([entry.row for entry in scores.values()])
+    for rows in questions:
+        ordered = sorted(rows, key=lambda row: not row.is_baseline)
+        groups.append(Group(_words(rows[0], questions[0][0]), {row.name: at + i for i, row in enumerate(ordered)}))
+        at += len(rows) + _GAP
+    return groups
+
+
+def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group]) -> None:
+    colours = family_colours(entry.row for entry in scores.values())
+    for name, place in (item for group in groups for item in group.places.items()):
+        entry = scores[name]
+        _bar(axes, entry, category, place, colours[entry.row.record.facts.family])
     axes.set_title(LABELS[category], loc="left", fontweight="bold")
-    axes.set_ylabel("IoU")
-    axes.grid(visible=False, axis="x")
-    axes.margins(x=0.02, y=0.12)
-    axes.set_ylim(bottom=0)
-    _legend(axes, layout)
+    axes.set_xlabel("IoU")
+    axes.tick_params(axis="y", length=0)
+    axes.grid(visible=False, axis="y")
+    axes.grid(visible=True, axis="x")
+    axes.set_xlim(0, _ROOM * max(_highest(scores, category), 1e-3))
 
 
-def _bar(axes: Axes, entry: RowScores, category: str, place: float, wide: float, colour: str) -> None:
-    """Draw a bar with its interval, its number and the paper's value."""
-    estimate = entry.estimate(category)
-    axes.bar(place, np.nan_to_num(estimate.value), 0.92 * wide, color=colour)
+def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str) -> None:
+    """Draw a bar with its interval, the paper's value, and its number at the right edge of the panel."""
+    estimate, paper = entry.estimate(category), paper_value(entry.row.record.name, category)
+    axes.barh(place, np.nan_to_num(estimate.value), 0.78, color=colour)
     if np.isfinite(estimate.low):
-        axes.plot([place, place], [estimate.low, estimate.high], color=INK, linewidth=1)
-    paper = _paper_value(entry, category)
+        axes.plot([estimate.low, estimate.high], [place, place], color=INK, linewidth=1)
     if np.isfinite(paper):
-        axes.plot(place + 0.3 * wide, paper, "D", markersize=3.2, **PAPER_MARKS)
-
-
-def _number(axes: Axes, entry: RowScores, category: str, place: float, label_iou: float) -> None:
-    """Write a bar's number above it, and above the paper's mark where that would lie on the number."""
-    estimate, paper = entry.estimate(category), _paper_value(entry, category)
-    top = float(np.nanmax([estimate.value, estimate.high, 0.0]))
-    hidden = np.isfinite(paper) and -label_iou / 4 < paper - top < label_iou
+        axes.plot(paper, place, "D", markersize=3.4, **PAPER_MARKS)
     label = f"{estimate.value:.2f}" if np.isfinite(estimate.value) else "absent"
-    at = (place, max(top, paper) if hidden else top)
-    axes.annotate(label, at, (0, 4 if hidden else 2), textcoords="offset points", ha="center", fontsize=7)
+    axes.text(1, place, label, transform=axes.get_yaxis_transform(), ha="right", va="center", fontsize=7)
 
 
-def _paper_value(entry: RowScores, category: str) -> float:
-    return paper_table().get(entry.row.record.name, {}).get(category, np.nan)
+def _name_rows(axes: Axes, groups: Sequence[Group]) -> None:
+    """Write each row's name at its bar, and each question above its rows."""
+    places = {name: place for group in groups for name, place in group.places.items()}
+    axes.set_yticks(list(places.values()), [short(name) for name in places], fontsize=8)
+    axes.set_ylim(max(places.values()) + 0.6, -_GAP - 0.3)  # downwards
+    for group in groups if len(groups) > 1 else ():
+        above = min(group.places.values()) - 0.78
+        axes.annotate(group.words, (0, above), (2, 0), textcoords="offset points", va="center", color=MUTED, fontsize=7)
+
+
+def _legend(figure: Figure, scores: Scores) -> None:
+    """Name the families' colours above the panels."""
+    colours = family_colours(entry.row for entry in scores.values())
+    handles = [Patch(color=colour) for colour in colours.values()]
+    labels = [short(family) for family in colours]
+    figure.legend(handles, labels, fontsize=8, ncols=len(labels), loc="outside upper right", handlelength=1)
 
 
 def _highest(scores: Scores, category: str) -> float:
-    """Return the highest value of a panel, which its height follows."""
+    """Return the highest value of a panel, which its width follows."""
     estimates = [entry.estimate(category) for entry in scores.values()]
-    papers = [_paper_value(entry, category) for entry in scores.values()]
+    papers = [paper_value(entry.row.record.name, category) for entry in scores.values()]
     return float(np.nanmax([0.0, *papers, *(v for e in estimates for v in (e.value, e.high))]))
 
 
-def _legend(axes: Axes, layout: Layout) -> None:
-    for model, colour in layout.colours.items():
-        axes.bar(np.nan, np.nan, color=colour, label=short(model))
-    axes.legend(
-        fontsize=8,
-        ncols=layout.models,
-        loc="lower right",
-        bbox_to_anchor=(1, 1),
-        borderaxespad=0.2,
-        handlelength=1,
-        columnspacing=1,
-    )
+def _words(row: Row, first: Row) -> str:
+    """Say what a question asks, as far as it is not what the first one asks."""
+    return ", ".join(_differences(row, first)) or ", ".join(_differences(row, None))
 
 
-def _experiment(entry: RowScores) -> str:
-    return entry.row.name.removeprefix(f"{entry.row.record.model}-")
+def _differences(row: Row, first: Row | None) -> Iterator[str]:
+    mine, theirs = row.record.facts, None if first is None else first.record.facts
+    lead_s = row.results[0].record.lead_s
+    if theirs is None or mine.inputs != theirs.inputs:
+        yield f"{mine.inputs} input{'' if mine.inputs == 1 else 's'}"
+    if theirs is None or mine.sensors != theirs.sensors:
+        yield short(" + ".join(mine.sensors), 40)
+    if theirs is None or (mine.horizon_steps, mine.step_frames) != (theirs.horizon_steps, theirs.step_frames):
+        yield f"{lead_s:.2f} s ahead"
+    if not mine.translate and (theirs is None or theirs.translate):
+        yield "inputs not moved to the target's time"
+    if mine.translate and theirs is not None and not theirs.translate:
+        yield "inputs moved to the target's time"
+    if first is not None and row.targets != first.targets:
+        yield "other targets"

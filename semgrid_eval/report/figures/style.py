@@ -2,6 +2,7 @@
 
 import io
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,11 +11,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from semgrid_eval.report.claims.paper import paper_table
+from semgrid_eval.report.claims.paper import in_paper
 from semgrid_eval.report.estimates.bootstrap import Scores
+from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.tables.table import plural
 
-# Okabe and Ito's colours, which colour-blind readers can tell apart; the first two are those of BL and ED.
+# Okabe and Ito's colours, which colour-blind readers can tell apart.
 PALETTE = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
 STROKES = ("-", "--", ":", "-.")
 INK, MUTED, RULE = "#2a2f36", "#5d6670", "#d5d9de"
@@ -44,7 +46,7 @@ SETTINGS: Any = {
 }
 PAPER_MARKS: Any = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.8}
 """How the paper's own values are marked: small hollow diamonds."""
-_NAME_CHARACTERS = 18
+_NAME_CHARACTERS = 24
 _PICTURE_DPI = 160
 
 
@@ -85,8 +87,14 @@ def evidence(scores: Scores) -> str:
 
 def paper_note(scores: Scores) -> str:
     """End a caption, saying what the diamonds are where the paper has any of the rows."""
-    beside = any(entry.row.record.name in paper_table() for entry in scores.values())
+    beside = any(in_paper(entry.row.record.name) for entry in scores.values())
     return "; diamonds are the paper's values, on Cityscapes." if beside else "."
+
+
+def family_colours(rows: Iterable[Row]) -> dict[str, str]:
+    """Return a colour for each family of models, those of baselines first."""
+    families = dict.fromkeys(row.record.facts.family for row in sorted(rows, key=lambda row: not row.is_baseline))
+    return {family: PALETTE[i % len(PALETTE)] for i, family in enumerate(families)}
 
 
 def line_style(index: int) -> dict[str, Any]:
@@ -95,10 +103,10 @@ def line_style(index: int) -> dict[str, Any]:
     return {"color": PALETTE[index % colours], "linestyle": STROKES[index // colours % len(STROKES)]}
 
 
-def short(name: str) -> str:
-    """Cut a name to what fits under a bar; control characters, which XML forbids, become spaces."""
+def short(name: str, characters: int = _NAME_CHARACTERS) -> str:
+    """Cut a name to what fits beside a bar; control characters, which XML forbids, become spaces."""
     name = "".join(character if character.isprintable() else " " for character in name)
-    return name if len(name) <= _NAME_CHARACTERS else f"{name[: _NAME_CHARACTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+    return name if len(name) <= characters else f"{name[: characters - 1]}\N{HORIZONTAL ELLIPSIS}"
 
 
 def finish(figure: Figure, name: str, source: str, caption: str) -> Plot:

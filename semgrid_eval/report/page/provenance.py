@@ -108,7 +108,8 @@ def command_table(runs: Sequence[Run]) -> Table:
             cells = (Cell(row.record.label), Cell(_state(row)), Cell(command, tone="command"))
             bodies.append((Line(row.name, cells),))
     caption = (
-        "How to make each row again. A run keeps what lies in its --out already: name another folder to start anew."
+        "The command that makes each row again. A run keeps the results that its --out folder already holds; "
+        "name another folder to start over."
     )
     columns = tuple((text, "") for text in ("What it does", "Results", "Command"))
     return Table("commands", caption, "Row", columns, tuple(bodies))

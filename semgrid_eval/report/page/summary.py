@@ -51,7 +51,9 @@ def _which(scores: Scores, found: Headline | None) -> str:
     if found is None:
         return "No row has a score: nothing can be compared."
     best = scores[found.best.name]
-    among = "" if found.compared == len(scores) else f"Of {found.compared} rows with the same inputs and horizon, "
+    among = (
+        "" if found.compared == len(scores) else f"Of {found.compared} rows with the same targets, inputs and horizon, "
+    )
     start = f"{among}{found.best.name} has the highest mean class IoU, {number(best.mean[HEADLINE])} without unknown"
     if found.rival is None:
         return f"{start} ({interval_phrase(best.estimate(HEADLINE))}); there is no other row to compare with."

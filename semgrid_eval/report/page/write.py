@@ -14,7 +14,7 @@ from semgrid_eval.files import atomic_folder
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.report.claims.claims import MARGIN
 from semgrid_eval.report.claims.findings import Finding, find, finding_table, missing_table, sentence
-from semgrid_eval.report.claims.paper import paper_table
+from semgrid_eval.report.claims.paper import in_paper
 from semgrid_eval.report.estimates.bootstrap import Everything, Parts, Scores, score_all
 from semgrid_eval.report.estimates.division import Division
 from semgrid_eval.report.estimates.paces import EDGES_MPS
@@ -22,8 +22,7 @@ from semgrid_eval.report.estimates.resampling import Level, Resampling
 from semgrid_eval.report.estimates.table import divisions
 from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
-from semgrid_eval.report.figures import bars, curves, diagrams
-from semgrid_eval.report.figures.calibration import calibration_plots
+from semgrid_eval.report.figures import bars, calibration, horizon, settings, training
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.page import provenance
 from semgrid_eval.report.page.colours import class_style
@@ -116,12 +115,11 @@ def draw_figures(everything: Everything, rows: Sequence[Row]) -> dict[str, list[
     """Draw all figures by section of the page."""
     scores, certainty = (everything[metric]["all"].get("all", {}) for metric in ("iou", "calibration"))
     return {
-        "overview": bars.category_overview(scores),
         "categories": bars.category_plots(scores),
-        "horizon": curves.horizon_plots(scores),
-        "training": curves.training_plots(rows),
-        "calibration": calibration_plots(certainty),
-        "architecture": diagrams.architecture_plots(scores),
+        "horizon": horizon.horizon_plots(scores),
+        "training": training.training_plots(rows),
+        "calibration": calibration.calibration_plots(certainty),
+        "settings": settings.settings_plots(scores),
     }
 
 
@@ -171,7 +169,7 @@ def render_page(material: Material, tables: PageTables) -> str:
         resampled=material.resampling.sentence,
         tables=tables.scores,
         parts=tables.divisions,
-        about_settings=sum(e.row.record.name not in paper_table() for e in scores.values()) > len(scores) / 2,
+        about_settings=sum(not in_paper(e.row.record.name) for e in scores.values()) > len(scores) / 2,
         findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
         margin=MARGIN,
         confusions=confusion_tables(scores, found),

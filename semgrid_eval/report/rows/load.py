@@ -106,8 +106,18 @@ class Row:
 
     @property
     def is_baseline(self) -> bool:
-        """Whether other rows are measured against it."""
+        """Whether other rows are measured against this one."""
         return self.record.facts.baseline
+
+    @property
+    def learns(self) -> bool:
+        """Whether its model was fitted to training windows."""
+        return self.record.facts.learns
+
+    @property
+    def targets(self) -> str:
+        """The comparability key of its results; empty where there is none."""
+        return self.results[0].record.targets if self.results else ""
 
     @property
     def shown(self) -> Result:
@@ -124,11 +134,6 @@ class Row:
     def windows(self) -> int:
         """Windows behind the row's scores."""
         return max((len(result.record.windows) for result in self.results), default=0)
-
-    @property
-    def targets(self) -> str:
-        """The key that rows must share to be subtracted from each other."""
-        return self.results[0].record.targets if self.results else ""
 
     @property
     def window_ms(self) -> tuple[float, ...]:
@@ -162,6 +167,11 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
             progress(done, total, row.name)
         runs.append(Run(folder, tag, record, tuple(rows)))
     return tuple(runs)
+
+
+def comparable(row: Row, other: Row) -> bool:
+    """Tell whether rows may be subtracted: both have results, and these have the same targets, in whichever runs."""
+    return row.targets == other.targets != ""
 
 
 def key_of(window: WindowRecord) -> tuple[str, int]:

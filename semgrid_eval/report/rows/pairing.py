@@ -1,4 +1,4 @@
-"""Which row is compared with which, and what the numbers then say in plain sentences."""
+"""Which row is compared with which: by what rows are and by the targets of their results, never by their names."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from semgrid_eval.report.estimates.bootstrap import Estimate, Scores
-from semgrid_eval.report.rows.load import Row
+from semgrid_eval.report.rows.load import Row, comparable, key_of
 
 HEADLINE = "mean_known"
 DIFFERENCE_COLUMNS = ("static_known", "small_static", "vehicles", "small_dynamic", HEADLINE)
@@ -19,35 +19,65 @@ class Headline:
     compared: int
     best: Row
     rival: Row | None  # the best row of the other kind (baseline or not), else the runner-up
-    reference: Row | None  # the baseline of the best row's own experiment
+    reference: Row | None  # the baseline of the best row
+
+
+def by_question(rows: Sequence[Row]) -> list[list[Row]]:
+    """Group rows by what they are asked, in the order in which this first appears.
+
+    Rows answer the same question if they have the same targets, sensors, number of inputs, frames between them and
+    horizon, and if inputs are moved to the target's time for all of them or for none.
+    """
+    groups: dict[tuple[object, ...], list[Row]] = {}
+    for row in rows:
+        f = row.record.facts
+        question = (row.targets, f.sensors, f.inputs, f.step_frames, f.horizon_steps, f.translate)
+        groups.setdefault(question, []).append(row)
+    return list(groups.values())
 
 
 def reference_of(row: Row, rows: Sequence[Row]) -> Row | None:
-    """Choose the baseline that a row is measured against: of its own experiment, else the nearest one.
+    """Choose the baseline that a row is measured against, None for a baseline and where there is none.
 
-    The nearest baseline shares run, horizon and, where possible, sensors; `DC`, which knows the motion, comes first.
+    It is a baseline of the same run, with the same targets, that looks as many frames ahead. Of several, the one is
+    taken that shares more with the row, in this order: the sensors, whether inputs are moved to the target's time, the
+    number of inputs, the frames between them; then one that does not learn; then the first one in the matrix.
     """
     if row.is_baseline:
         return None
     choices = [
         other
         for other in rows
-        if other.is_baseline and other.run == row.run and other.record.horizon_steps == row.record.horizon_steps
+        if other.is_baseline
+        and other.run == row.run
+        and comparable(row, other)
+        and _frames_ahead(other) == _frames_ahead(row)
     ]
     return max(choices, key=lambda other: _nearness(row, other), default=None)
 
 
+def main_group(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows of the question that most rows answer; of equally many, the one that comes first."""
+    return max(by_question(rows), key=len, default=[])
+
+
 def headline(scores: Scores) -> Headline | None:
-    """Find the best row among those that answer the same question; None where nothing is scored."""
+    """Find the best row among those that answer the main question; None where nothing is scored."""
     rows = [entry.row for entry in scores.values() if np.isfinite(entry.mean[HEADLINE])]
     if not rows:
         return None
-    group = _main_group(rows)
+    group = main_group(rows)
     best = max(group, key=lambda row: scores[row.name].mean[HEADLINE])
     others = [row for row in group if row.is_baseline != best.is_baseline]
     others = others or [row for row in group if row != best]
     rival = max(others, key=lambda row: scores[row.name].mean[HEADLINE], default=None)
     return Headline(len(group), best, rival, reference_of(best, rows))
+
+
+def shared_windows(row: Row, other: Row) -> int:
+    """Count the target frames that both rows are scored on."""
+    mine, theirs = ({key_of(w) for w in each.results[0].record.windows} for each in (row, other))
+    return len(mine & theirs)
 
 
 def verdict(difference: Estimate) -> str:
@@ -57,21 +87,17 @@ def verdict(difference: Estimate) -> str:
     return "gain" if difference.value > 0 else "loss"
 
 
+def _frames_ahead(row: Row) -> int:
+    return row.record.facts.horizon_steps * row.record.facts.step_frames
+
+
 def _nearness(row: Row, other: Row) -> tuple[bool, ...]:
     """Order baselines by how much of the row's question they share."""
-    mine, theirs = row.record, other.record
+    mine, theirs = row.record.facts, other.record.facts
     return (
-        mine.experiment == theirs.experiment and theirs.model == "BL",
         mine.sensors == theirs.sensors,
         mine.translate == theirs.translate,
-        theirs.experiment == "DC",
+        mine.inputs == theirs.inputs,
+        mine.step_frames == theirs.step_frames,
+        not theirs.learns,
     )
-
-
-def _main_group(rows: Sequence[Row]) -> list[Row]:
-    """Take the rows of one run, horizon and set of inputs: those of experiment DC, else the largest such group."""
-    groups: dict[tuple[object, ...], list[Row]] = {}
-    for row in rows:
-        key = (row.run, row.record.horizon_steps, row.record.sensors, row.record.inputs)
-        groups.setdefault(key, []).append(row)
-    return max(groups.values(), key=lambda group: (any(row.record.experiment == "DC" for row in group), len(group)))

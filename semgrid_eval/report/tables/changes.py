@@ -1,56 +1,87 @@
-"""What each row of a matrix changes against the row it is closest to, and what the change does to its score."""
+"""What each row of a matrix changes against the row that it is closest to, and what cannot be compared at all."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS
-from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, interval_phrase, plural
-
-_UNSET = "not set"
+from semgrid_eval.report.rows.load import Row, comparable
+from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, main_group, shared_windows
+from semgrid_eval.report.rows.settings import changed_settings, changed_targets, settings_of
+from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, interval_phrase, number, plural
 
 
 def changes_table(scores: Scores) -> Table | None:
-    """Show what each row changes against the row of its model that it is closest to, and what that does to scores."""
+    """Show what each row changes against the row of its model above it that it is closest to, and what that does."""
     entries, bodies = list(scores.values()), []
-    settings = [entry.row.results[0].settings for entry in entries]
     for at, entry in enumerate(entries):
-        changes = [(changed_settings(settings[i], settings[at]), entries[i]) for i in _alike(at, entries)]
-        changed, base = min(changes, key=lambda change: len(change[0]), default=([], entry))
-        if not changed:
+        base = _closest(entry, entries[:at])
+        changed = changed_settings(settings_of(base.row), settings_of(entry.row)).values() if base else ()
+        if base is None or not changed:
             continue
-        cells = (Cell("; ".join(changed)), *(_difference(entry, base, column) for column in DIFFERENCE_COLUMNS))
-        bodies.append((Line(f"{entry.row.name} \N{MINUS SIGN} {base.row.name}", cells),))
-    caption = "What each row changes against the row of its model that it is closest to, and what that does to scores."
+        cells = (Cell("; ".join(changed)), *(_change(entry, base, column) for column in DIFFERENCE_COLUMNS))
+        bodies.append((Line(_pair(entry, base), cells),))
+    caption = (
+        "What each row changes against the row above it that has the same model and the fewest other settings, "
+        "and the difference of their scores. Where the targets are others, both scores are shown instead."
+    )
     columns = (("Settings", ""), *((LABELS[column], "") for column in DIFFERENCE_COLUMNS))
     return Table("changes", caption, "Rows", columns, tuple(bodies)) if bodies else None
 
 
-def changed_settings(before: Mapping[str, object], after: Mapping[str, object]) -> list[str]:
-    """List which flat settings differ: `network.depth 3 to 4`."""
-    keys = [*before, *(key for key in after if key not in before)]
-    pairs = [(key, before.get(key, _UNSET), after.get(key, _UNSET)) for key in keys]
-    return [f"{key} {_text(first)} to {_text(second)}" for key, first, second in pairs if first != second]
+def not_compared_table(scores: Scores) -> Table | None:
+    """List the rows whose targets are others than those of the main group, and what makes them so."""
+    rows = [entry.row for entry in scores.values()]
+    main = main_group(rows)[:1]
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        if not comparable(row, main[0]):
+            groups.setdefault(row.targets, []).append(row)
+    with_main = [row for row in rows if comparable(row, main[0])]
+    bodies = tuple((_other_targets(group, with_main),) for group in groups.values())
+    caption = (
+        f"Not compared with {main[0].name} and the rows that share its targets. Scores are subtracted only between "
+        "rows with the same targets: the same frames of the same logs, grid, mask mode and split."
+        if main
+        else ""
+    )
+    columns = (("What differs", ""), ("Windows", ""))
+    return Table("not-compared", caption, "Rows with the same targets", columns, bodies) if bodies else None
 
 
-def _alike(at: int, entries: Sequence[RowScores]) -> list[int]:
-    """List the rows of the same model and run that may be the base of one: those above it, and the DC row."""
-    mine = entries[at].row
-    return [
-        i
-        for i, other in enumerate(entries)
-        if (i < at or (i > at and other.row.record.experiment == "DC"))
-        and (other.row.record.model, other.row.run) == (mine.record.model, mine.run)
+def _other_targets(group: Sequence[Row], with_main: Sequence[Row]) -> Line:
+    """Say what makes the targets of a group of rows others than those of the row that they are closest to."""
+    row = group[0]
+    base = min(with_main, key=lambda other: len(changed_settings(settings_of(other), settings_of(row))))
+    reasons = changed_targets(settings_of(base), settings_of(row)) or ["the logs or their frames"]
+    shared = shared_windows(row, base)
+    cells = (
+        Cell(f"{'; '.join(reasons)} (against {base.name})"),
+        Cell(f"{row.windows:,}", row.windows, f"{shared:,} shared"),
+    )
+    return Line(", ".join(each.name for each in group), cells)
+
+
+def _closest(entry: RowScores, above: Sequence[RowScores]) -> RowScores | None:
+    """Find the row of the same model and run with the fewest other settings, rather one with the same targets."""
+    mine = entry.row
+    alike = [
+        other for other in above if (other.row.record.facts.model, other.row.run) == (mine.record.facts.model, mine.run)
     ]
+    return min(alike, key=lambda other: _distance(mine, other.row), default=None)
 
 
-def _difference(entry: RowScores, base: RowScores, column: str) -> Cell:
-    difference = entry.minus(base, column)
+def _distance(row: Row, base: Row) -> tuple[int, bool]:
+    return len(changed_settings(settings_of(base), settings_of(row))), not comparable(row, base)
+
+
+def _pair(entry: RowScores, base: RowScores) -> str:
+    sign = "\N{MINUS SIGN}" if comparable(entry.row, base.row) else "beside"
+    return f"{entry.row.name} {sign} {base.row.name}"
+
+
+def _change(entry: RowScores, base: RowScores, column: str) -> Cell:
     title = f"{plural(entry.row.windows, 'window')}; {plural(len(entry.row.results), 'result')}"
-    title += f"; {interval_phrase(difference, with_sign=True)}"
-    return difference_cell(difference, title=title)
-
-
-def _text(value: object) -> str:
-    if isinstance(value, list):
-        return ", ".join(str(part) for part in value)
-    return "none" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+    if not comparable(entry.row, base.row):
+        text = f"{number(entry.mean[column])}, {number(base.mean[column])}"
+        return Cell(text, note="other targets", title=f"{title}; the targets differ, so there is no difference")
+    difference = entry.minus(base, column)
+    return difference_cell(difference, title=f"{title}; {interval_phrase(difference, with_sign=True)}")

@@ -8,14 +8,14 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.estimates.bootstrap import CATEGORY_COLUMNS, LABELS, MERGED_COLUMNS, RowScores, Scores
 from semgrid_eval.report.rows.load import Result
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS
-from semgrid_eval.report.tables.changes import changes_table
+from semgrid_eval.report.tables.changes import changes_table, not_compared_table
 from semgrid_eval.report.tables.table import ABSENT, Cell, Line, Table, plain_cell, plural
 from semgrid_eval.report.tables.values import difference_table, run_differences, seeds, value_table
 from semgrid_eval.scores.metrics.metric import Floats, Metric, divided
 
 _PAPER = (
     "The paper's values (Table A1) come from Cityscapes' validation set; "
-    "differences to them are marked where the row's interval leaves them out."
+    "differences to them are marked where the row's interval excludes them."
 )
 _CATEGORIES = f"Category scores: mean of the class IoUs, with 95% interval. Best of each column in bold. {_PAPER}"
 _CLASSES = f"Class IoU with 95% interval. {_PAPER}"
@@ -34,6 +34,7 @@ def score_tables(scores: Scores, tags: Sequence[str]) -> dict[str, Table | None]
         "class_differences": difference_table("class-differences", _to_baseline("class"), scores, CLASS_NAMES),
         "classes": value_table("classes", _CLASSES, scores, CLASS_NAMES, beside_paper=True),
         "changes": changes_table(scores),
+        "not_compared": not_compared_table(scores),
         "merged": value_table("merged", _MERGED, scores, MERGED_COLUMNS),
         "windows": window_means(scores),
         "runs": run_differences(

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from semgrid_eval.report.claims.paper import paper_table
-from semgrid_eval.report.estimates.bootstrap import Estimate, Parts, RowScores, Scores, comparable
+from semgrid_eval.report.estimates.bootstrap import Estimate, Parts, RowScores, Scores
+from semgrid_eval.report.rows.load import comparable
 from semgrid_eval.report.rows.pairing import reference_of, verdict
 from semgrid_eval.report.tables.table import (
     ABSENT,

@@ -12,9 +12,9 @@ from semgrid_eval.report.claims.scaling import scaling
 from semgrid_eval.report.estimates.bootstrap import LEVEL, Everything
 from semgrid_eval.report.estimates.resampling import Resampling
 from semgrid_eval.report.figures.calibration import calibration_frame
-from semgrid_eval.report.figures.curves import training_frame
-from semgrid_eval.report.figures.diagrams import architecture_frame
+from semgrid_eval.report.figures.settings import settings_frame
 from semgrid_eval.report.figures.style import Plot
+from semgrid_eval.report.figures.training import training_frame
 from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
 from semgrid_eval.report.rows.load import Result, Row, Run
 from semgrid_eval.report.tables.formats.csv import frame_csv
@@ -46,7 +46,7 @@ def write_numbers(folder: Path, numbers: Numbers) -> None:
         "scores": seed_frame(numbers.everything),
         "findings": finding_frame(numbers.findings),
         "calibration": calibration_frame(numbers.everything["calibration"]["all"].get("all", {})),
-        "architecture": architecture_frame(scores),
+        "settings": settings_frame(scores),
         "training": training_frame([row for run in runs for row in run.rows]),
         "windows": window_frame(runs),
     }

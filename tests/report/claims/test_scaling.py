@@ -69,7 +69,6 @@ def test_a_run_without_a_trained_row_of_the_paper_says_nothing(run):
 
 def test_the_papers_settings_are_those_of_its_preset():
     row = next(row for row in load_matrix("paper").rows if row.name == "ED-DC")
-    settings = row.model_dump()
     for key, (_, value) in PAPER_SETTINGS.items():
-        assert reduce(getitem, key.split("."), settings) == value
+        assert reduce(getitem, key.split("."), row.model_dump()) == value
     assert row.repeats == PAPER_REPEATS

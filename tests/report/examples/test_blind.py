@@ -9,7 +9,7 @@ from semgrid_eval.arrays import read_arrays
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.report.examples.blind import blind_cells
-from semgrid_eval.report.examples.kept import Glimpses
+from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.results import WindowRecord, windows_file
 from semgrid_eval.scores.thumbnails import Track
@@ -41,7 +41,7 @@ def test_ground_in_blind_cells_is_in_no_input_but_in_the_target(seen, place):
     row = next(row for row in run.rows if row.name == "own-Sp2")
     window = row.shown.record.windows[place]
     arrays = read_arrays(windows_file(seen, row.shown.record.windows_id), ("inputs", "target"))
-    known = Glimpses(run).of(window.log, row.shown)
+    known = RunThumbnails(run).of(window.log, row.shown)
     blind = blind_cells(known.track, GridConfig(), SPLIT, window)
     inside = shrunk(blind, 2)  # cells at the edge are partly seen, and morphology spreads them
     inputs, target = np.isin(arrays["inputs"][place], GROUND).any(axis=(0, 1)), np.isin(arrays["target"][place], GROUND)

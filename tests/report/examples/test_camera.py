@@ -10,7 +10,7 @@ from semgrid_eval.classes import CLASS_NAMES, class_palette
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.report.examples.camera import View
 from semgrid_eval.report.examples.drawing import POINTLESS, POINTLESS_COLOUR
-from semgrid_eval.report.examples.kept import Glimpses
+from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.thumbnails import FramePictures
 
@@ -22,7 +22,7 @@ def view(seen):
     (run,) = load_runs([seen])
     row = next(row for row in run.rows if row.name == "own-Sp2")
     window = row.shown.record.windows[1]
-    return View(window, Glimpses(run).of(window.log, row.shown), GridConfig(), SPLIT)
+    return View(window, RunThumbnails(run).of(window.log, row.shown), GridConfig(), SPLIT)
 
 
 def decoded(uri):

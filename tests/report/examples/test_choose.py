@@ -94,6 +94,25 @@ def test_the_papers_contest_comes_first_and_others_follow(run):
     ]
 
 
+def test_a_row_named_like_a_baseline_that_is_none_is_measured_against_one(tmp_path):
+    kinds = (FakeRow("plain", "x", baseline=True), FakeRow("mine", "BL", 0.1, 1, baseline=False))
+    loaded = load_runs([make_fake_run(tmp_path / "run", rows=kinds, recordings=2)])[0].rows
+    (found,) = contests(loaded, headline(score_rows(loaded, np.random.default_rng(0), draws=2)))
+    assert (found.model.name, [row.name for row in found.rivals]) == ("BL-mine", ["x-plain"])
+
+
+def test_only_the_baselines_own_twin_on_inputs_that_are_not_moved_is_a_rival(tmp_path):
+    kinds = (
+        FakeRow("DC", "ED", 0.1, 1),
+        FakeRow("NT", "ED", 0.1, 1, translate=False),
+        FakeRow("Fuse", "BL"),
+        FakeRow("NT", "BL", translate=False),  # of another baseline
+    )
+    loaded = load_runs([make_fake_run(tmp_path / "run", rows=kinds, recordings=2)])[0].rows
+    first = contests(loaded, headline(score_rows(loaded, np.random.default_rng(0), draws=2)))[0]
+    assert (first.model.name, [row.name for row in first.rivals]) == ("ED-DC", ["BL-Fuse"])
+
+
 def test_where_nothing_is_scored_there_is_no_contest(run):
     assert contests(list(_rows(run).values()), None) == []
 

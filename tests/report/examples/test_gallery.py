@@ -10,7 +10,7 @@ from semgrid_eval.report.estimates.bootstrap import score_rows
 from semgrid_eval.report.examples import gallery as gallery_module
 from semgrid_eval.report.examples.choose import Contest, choose
 from semgrid_eval.report.examples.gallery import example_groups, gaps, groups_of, widths
-from semgrid_eval.report.examples.kept import Glimpses
+from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.rows.pairing import headline
 from semgrid_eval.scores.results import read_windows
@@ -107,6 +107,6 @@ def test_lost_arrays_are_told_not_raised(tmp_path, lost):
         shutil.rmtree(run.folder / "windows")
     for result in rows["ED-DC"].results if lost == "predictions.npz" else ():
         (result.folder / lost).unlink()
-    (group,) = groups_of(contest, {"": choose(contest, best=1, worst=1)}, Glimpses(run))
+    (group,) = groups_of(contest, {"": choose(contest, best=1, worst=1)}, RunThumbnails(run))
     assert group.windows == ()
     assert (lost if lost == "predictions.npz" else contest.result.record.windows_id) in group.problem

@@ -6,8 +6,8 @@ from support.fake_run import with_counts
 
 from semgrid_eval.report.examples.choose import Contest, Pick
 from semgrid_eval.report.examples.drawing import HATCH_LEGEND, MASK_LEGEND
-from semgrid_eval.report.examples.kept import Glimpses
 from semgrid_eval.report.examples.panels import Shown, draw_examples
+from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import load_runs
 
 PICK = Pick(0, "Largest", 0.25)
@@ -22,7 +22,7 @@ def opened(folder):
 def draw(folder, model, *rivals, picks=(PICK,), baselines=()):
     run, rows = opened(folder)
     contest = Contest(rows[model], tuple(rows[name] for name in rivals), tuple(rows.get(name) for name in baselines))
-    return list(draw_examples(Shown(contest, {pick.index for pick in picks}), picks, Glimpses(run)))
+    return list(draw_examples(Shown(contest, {pick.index for pick in picks}), picks, RunThumbnails(run)))
 
 
 def kinds(column):
@@ -116,6 +116,6 @@ def test_a_rival_without_the_window_is_left_out(seen):
     rival = rows["BL-DC"]
     shown = with_counts(rival.shown, rival.shown.counts[1:], windows=rival.shown.record.windows[1:])
     shorter = replace(rival, results=(shown,))
-    (example,) = draw_examples(Shown(Contest(rows["own-DC"], (shorter,)), {PICK.index}), (PICK,), Glimpses(run))
+    (example,) = draw_examples(Shown(Contest(rows["own-DC"], (shorter,)), {PICK.index}), (PICK,), RunThumbnails(run))
     assert [column.title for column in example.answers] == ["own-DC", "Certainty"]
     assert np.all([column.pictures for column in example.answers])

@@ -1,71 +1,116 @@
+import io
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.fake_run import counted_row
+from PIL import Image
+from support.fake_run import FakeRow, counted_row, make_fake_run
 
 from semgrid_eval.report.estimates.bootstrap import score_rows
-from semgrid_eval.report.figures.bars import category_plot, lay_out
+from semgrid_eval.report.figures.bars import category_plots, lay_out
+from semgrid_eval.report.figures.style import INK, PALETTE, family_colours
+from semgrid_eval.report.rows.load import load_runs
 
-NAMES = ("BL-DC", "ED-DC", "BL-Sp1", "ED-Sp1", "ED-SL3", "ED-PH1", "BL-Fuse")
+ROWS = (
+    FakeRow("DC", "ED", 0.05, 1),
+    FakeRow("DC", "BL"),
+    FakeRow("PH1", "ED", 0.2, 1, horizon_steps=2),
+    FakeRow("NT", "BL", translate=False),
+    FakeRow("SL3", "ED", 0.2, 1, inputs=3),
+    FakeRow("Sp2", "ED", 0.2, 1, sensors=("lower", "upper")),
+    FakeRow("fine", "ED", 0.2, 1, cell_m=0.5),
+    FakeRow("mine", "BL", 0.2, 1, baseline=False),
+)
 
 
-@pytest.fixture(scope="module")
-def scores():
-    rows = [counted_row(name, {"car": [60, 80], "road": [90, 90]}) for name in NAMES]
+def _scores(rows):
     return score_rows(rows, np.random.default_rng(0), draws=10)
 
 
-def test_experiments_stand_in_the_papers_groups_with_gaps_between(scores):
-    layout = lay_out(scores)
-    assert list(layout.groups.values()) == [["DC", "Fuse"], ["Sp1"], ["SL3"], ["PH1"]]
-    assert layout.places == {"DC": 0, "Fuse": 1, "Sp1": 2.5, "SL3": 4, "PH1": 5.5}
-    assert list(layout.colours) == ["BL", "ED"]
+@pytest.fixture(scope="module")
+def scores(tmp_path_factory):
+    run = make_fake_run(tmp_path_factory.mktemp("runs") / "run", rows=ROWS, recordings=2, windows=1)
+    return _scores(load_runs([run])[0].rows)
 
 
-def test_rows_of_several_runs_keep_their_groups(scores):
-    tagged = {
-        f"{name} ({run})": replace(entry, row=replace(entry.row, name=f"{name} ({run})"))
-        for run in ("a", "b")
-        for name, entry in scores.items()
-    }
-    assert lay_out(tagged).groups["SL: inputs"] == ["SL3 (a)", "SL3 (b)"]
+def _plot(scores):
+    (plot,) = category_plots(scores)
+    return plot
 
 
-def _places(svg):
+def _texts(svg):
     """Where each text of a drawing stands: x and y in points, y downwards."""
     texts = [each for each in ET.fromstring(svg).iter() if each.tag.endswith("text")]
-    return {each.text: (float(each.get("x")), float(each.get("y"))) for each in texts}
+    return {each.text: (float(each.get("x") or 0), float(each.get("y") or 0)) for each in texts}
 
 
-def test_bars_stand_in_the_order_of_the_legend_whatever_the_order_of_rows():
-    rows = [counted_row(name, {"car": [hits, hits]}) for name, hits in (("ED-DC", 70), ("BL-DC", 30))]
-    places = _places(category_plot(score_rows(rows, np.random.default_rng(0), draws=2), ("vehicles",), "x").svg)
-    assert places["0.30"][0] < places["0.70"][0]
-    assert places["BL"][0] < places["ED"][0]
+def test_rows_of_one_question_stand_together_baselines_first_with_gaps_between(scores):
+    assert [(group.words, group.places) for group in lay_out(scores)] == [
+        ("2 inputs, front, 0.29 s ahead", {"BL-DC": 0, "ED-DC": 1, "BL-mine": 2}),
+        ("0.59 s ahead", {"ED-PH1": 4}),
+        ("inputs not moved to the target's time", {"BL-NT": 6}),
+        ("3 inputs", {"ED-SL3": 8}),
+        ("lower + upper", {"ED-Sp2": 10}),
+        ("other targets", {"ED-fine": 12}),
+    ]
 
 
-def test_a_number_stands_above_the_papers_mark_where_that_would_lie_on_it():
-    def height_of(name):
-        rows = [counted_row(name, {"car": [53, 53]}), counted_row("BL-Fuse", {"car": [90, 90]})]
-        return _places(category_plot(score_rows(rows, np.random.default_rng(0), draws=2), ("vehicles",), "x").svg)[
-            "0.53"
-        ][1]
-
-    assert height_of("BL-DC") < height_of("BL-Table")  # the paper has 0.535 for the first and nothing for the second
+def test_each_row_is_named_in_full_and_each_question_in_words(scores):
+    texts = _texts(_plot(scores).svg)
+    assert set(scores) | {group.words for group in lay_out(scores)} <= set(texts)
+    assert f"{scores['ED-DC'].mean['vehicles']:.2f}" in texts
+    assert texts["BL-DC"][1] < texts["ED-DC"][1] < texts["ED-PH1"][1]
 
 
-def test_a_panel_names_its_groups_and_says_what_it_rests_on(scores):
-    panel = category_plot(scores, ("vehicles",), "vehicles")
-    texts = [element.text for element in ET.fromstring(panel.svg).iter() if element.tag.endswith("text")]
-    assert {"SF: sensors fused", "SL: inputs", "PH: horizon", "0.70"} <= set(texts)
+def test_one_question_needs_no_words():
+    rows = [counted_row(name, {"car": [60, 80]}) for name in ("ED-DC", "BL-DC")]
+    texts = _texts(_plot(_scores(rows)).svg)
+    assert not any("ahead" in (text or "") for text in texts)
+
+
+def test_families_have_one_colour_each_those_of_baselines_first(scores):
+    rows = [entry.row for entry in scores.values()]
+    assert family_colours(rows) == {"BL": PALETTE[0], "ED": PALETTE[1]}
+    assert list(family_colours(row for row in rows if not row.is_baseline)) == ["ED", "BL"]
+
+
+def test_the_panels_of_all_categories_name_the_rows_once(scores):
+    plot = _plot(scores)
+    texts = [each.text for each in ET.fromstring(plot.svg).iter() if each.tag.endswith("text")]
+    assert texts.count("ED-DC") == 1
+    assert {"Static", "Small static", "Vehicles", "Small dynamic", "BL", "ED"} <= set(texts)
+    assert Image.open(io.BytesIO(plot.png)).width > 1500
+    assert category_plots({}) == []
+
+
+def test_a_panel_says_what_it_rests_on(scores):
+    panel = _plot(scores)
     assert "(2 windows a row, 2 recordings)" in panel.caption
     assert "diamonds are the paper's values" in panel.caption
     assert panel.source == "summary.csv"
-    assert panel.width_px == pytest.approx(96 * 4.8, abs=1)
+
+
+def test_more_rows_make_a_panel_higher_and_no_wider(scores):
+    few, many = (_plot(dict(list(scores.items())[:n])) for n in (2, 8))
+    assert few.width_px == many.width_px
+    assert few.height_px < many.height_px
 
 
 def test_rows_that_the_paper_lacks_have_no_diamonds(scores):
-    panel = category_plot({"BL-Fuse": scores["BL-Fuse"]}, ("vehicles",), "vehicles")
-    assert "diamonds" not in panel.caption
+    assert "diamonds" not in _plot({"ED-fine": scores["ED-fine"]}).caption
+
+
+def test_the_themed_drawing_keeps_its_text_and_follows_the_theme(scores):
+    panel = _plot(scores)
+    assert _texts(panel.themed_svg) == _texts(panel.svg)
+    assert "prefers-color-scheme:dark" in panel.themed_svg
+    assert INK not in panel.themed_svg.split("</style>", 1)[1]
+
+
+def test_names_in_any_script_are_drawn(scores):
+    entry = scores["ED-DC"]
+    facts = entry.row.record.facts.model_copy(update={"family": "\u6a21\u578b \x1b[0m"})
+    record = entry.row.record.model_copy(update={"facts": facts})
+    odd = {"\u9053\u8def": replace(entry, row=replace(entry.row, name="\u9053\u8def", record=record))}
+    assert {"\u9053\u8def", "\u6a21\u578b  [0m"} <= set(_texts(_plot(odd).svg))

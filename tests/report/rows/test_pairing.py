@@ -9,19 +9,24 @@ from semgrid_eval.report.estimates.bootstrap import Estimate, score_rows
 from semgrid_eval.report.page.provenance import failures
 from semgrid_eval.report.page.summary import summarise
 from semgrid_eval.report.rows.load import Run, load_runs
-from semgrid_eval.report.rows.pairing import headline, reference_of, verdict
+from semgrid_eval.report.rows.pairing import comparable, headline, reference_of, verdict
 from semgrid_eval.scores.results import NOT_RUN
 
 ROWS = (
-    FakeRow("Fuse", "BL"),
+    FakeRow("Table", "BL", learns=True),
     FakeRow("DC", "BL"),
+    FakeRow("Fuse", "BL"),
     FakeRow("NT", "BL", translate=False),
     FakeRow("PH1", "BL", horizon_steps=2),
+    FakeRow("fine", "BL", cell_m=0.5),
     FakeRow("DC", "ED", 0.05, 1),
     FakeRow("NT", "ED", 0.2, 1, translate=False),
-    FakeRow("SL3", "ED", 0.2, 1),
+    FakeRow("SL3", "ED", 0.2, 1, inputs=3),
     FakeRow("PH1", "ED", 0.2, 1, horizon_steps=2),
     FakeRow("PH2", "ED", 0.2, 1, horizon_steps=3),
+    FakeRow("fine", "ED", 0.2, 1, cell_m=0.5),
+    FakeRow("coarse", "ED", 0.2, 1, cell_m=2.0),
+    FakeRow("mine", "BL", 0.2, 1, baseline=False),
 )
 
 
@@ -40,6 +45,9 @@ def rows(tmp_path_factory):
         ("ED-PH1", "BL-PH1"),
         ("ED-PH2", None),
         ("BL-DC", None),
+        ("BL-mine", "BL-DC"),
+        ("ED-fine", "BL-fine"),
+        ("ED-coarse", None),
     ],
 )
 def test_a_row_is_measured_against_the_baseline_of_its_question(rows, name, reference):
@@ -50,7 +58,8 @@ def test_a_row_is_measured_against_the_baseline_of_its_question(rows, name, refe
 
 def test_the_headline_compares_rows_of_one_question_only(rows):
     found = headline(score_rows(rows, np.random.default_rng(0), draws=2))
-    assert found.best.record.horizon_steps == 1
+    assert found.best.record.facts.horizon_steps == 1
+    assert found.compared == 5
     assert found.rival.is_baseline != found.best.is_baseline
 
 
@@ -78,7 +87,7 @@ def test_the_summary_says_who_leads_by_how_much_and_on_what_it_rests(run):
     summary = summarise(runs, scores, found)
     lead = scores["ED-DC"].mean["mean_known"] - scores["BL-Fuse"].mean["mean_known"]
     assert summary.sentences[0].startswith(
-        "Of 4 rows with the same inputs and horizon, ED-DC has the highest mean class IoU, "
+        "Of 3 rows with the same targets, inputs and horizon, ED-DC has the highest mean class IoU, "
     )
     assert f"+{lead:.3f} over BL-Fuse, the best baseline, clearly better (95% interval +" in summary.sentences[0]
     assert "16 windows from 8 recordings" in summary.sentences[2]
@@ -110,7 +119,23 @@ def test_what_is_nowhere_is_not_compared():
 
 def test_only_rows_with_as_many_inputs_are_compared_first():
     more = counted_row("ED-SL5", {"road": [90] * 12})
-    more = replace(more, record=more.record.model_copy(update={"inputs": 5}))
+    facts = more.record.facts.model_copy(update={"inputs": 5})
+    more = replace(more, record=more.record.model_copy(update={"facts": facts}))
     rows = [counted_row("BL-DC", {"road": [50] * 12}), counted_row("ED-DC", {"road": [60] * 12}), more]
     found = headline(score_rows(rows, np.random.default_rng(0)))
     assert (found.best.name, found.rival.name, found.compared) == ("ED-DC", "BL-DC", 2)
+
+
+def test_rows_are_compared_only_with_the_same_targets_in_whichever_run(rows, tmp_path):
+    by_name = {row.name: row for row in rows}
+    assert comparable(by_name["ED-DC"], by_name["BL-PH1"])
+    assert not comparable(by_name["ED-fine"], by_name["BL-DC"])
+    other = make_fake_run(tmp_path / "other", rows=ROWS[1:2], recordings=3, windows=1)
+    fewer = make_fake_run(tmp_path / "fewer", rows=ROWS[1:2], recordings=2, windows=1)
+    assert comparable(by_name["BL-DC"], load_runs([other])[0].rows[0])
+    assert not comparable(by_name["BL-DC"], load_runs([fewer])[0].rows[0])
+
+
+def test_a_row_without_a_result_can_be_compared_with_none(rows):
+    left = replace(rows[0], results=())
+    assert not comparable(left, left)

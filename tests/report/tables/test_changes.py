@@ -2,41 +2,77 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.fake_run import FakeRow, make_fake_run
 
 from semgrid_eval.report.estimates.bootstrap import score_rows
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables.changes import changed_settings, changes_table
+from semgrid_eval.report.tables.changes import changes_table, not_compared_table
 
-
-def test_settings_are_compared_key_by_key():
-    before = {"network.depth": 3, "network.features": 64, "translate": True, "sensors": ["front"]}
-    after = {"network.depth": 4, "network.features": 64, "translate": False, "sensors": ["a", "b"], "clip": None}
-    assert changed_settings(before, after) == [
-        "network.depth 3 to 4",
-        "translate true to false",
-        "sensors front to a, b",
-        "clip not set to none",
-    ]
-    assert changed_settings(before, before) == []
+MODELS = ("BL", "ED")
 
 
 def _with_config(row, name, **config):
     results = tuple(replace(r, record=r.record.model_copy(update={"config": config})) for r in row.results)
-    record = row.record.model_copy(update={"name": name, "experiment": name})
-    return replace(row, name=name, record=record, results=results)
+    return replace(row, name=name, record=row.record.model_copy(update={"name": name}), results=results)
 
 
-def test_each_row_is_set_against_the_dc_row_of_its_model(run):
+def test_each_row_is_set_against_the_closest_one_of_its_model_above_it(run):
     scores = score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=20)
     table = changes_table(scores)
     assert [body[0].header for body in table.bodies] == [
-        f"{name} \N{MINUS SIGN} {name[:2]}-DC" for name in ("BL-NT", "BL-Fuse", "BL-Sp2", "ED-Sp2")
+        "BL-NT \N{MINUS SIGN} BL-DC",
+        "ED-Sp2 \N{MINUS SIGN} ED-DC",
     ]
     settings, *_, mean = table.bodies[-1][0].cells
-    assert settings.text == "experiment DC to Sp2"
+    assert settings.text == "sensors front to lower, upper"
     assert mean.sort == pytest.approx(scores["ED-Sp2"].mean["mean_known"] - scores["ED-DC"].mean["mean_known"])
     for words in ("16 windows", "2 results", "95% interval"):
         assert words in mean.title
+
+
+@pytest.fixture(scope="module")
+def finer(tmp_path_factory):
+    """Scores of rows of which two have finer grids, so other targets."""
+    rows = tuple(FakeRow(w, f, 0.1, int(f == "ED"), cell_m=m) for w, m in (("DC", 0.8), ("fine", 0.4)) for f in MODELS)
+    run = make_fake_run(
+        tmp_path_factory.mktemp("runs") / "run", rows=(*rows, FakeRow("Fuse", "BL", cell_m=0.8)), recordings=2
+    )
+    return score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=2)
+
+
+def test_scores_on_other_targets_stand_side_by_side_and_are_not_subtracted(finer):
+    (line,) = next(body for body in changes_table(finer).bodies if body[0].header.startswith("ED"))
+    assert line.header == "ED-fine beside ED-DC"
+    settings, *_, mean = line.cells
+    assert settings.text == "grid.cell_m 0.8 to 0.4"
+    assert mean.text == f"{finer['ED-fine'].mean['mean_known']:.3f}, {finer['ED-DC'].mean['mean_known']:.3f}"
+    assert (mean.note, mean.sort) == ("other targets", None)
+
+
+def test_the_page_says_which_rows_are_not_compared_and_why(finer):
+    table = not_compared_table(finer)
+    assert "BL-DC and the rows that share its targets" in table.caption
+    ((line,),) = table.bodies
+    assert line.header == "BL-fine, ED-fine"
+    assert line.cells[0].text == "grid.cell_m 0.8 to 0.4 (against BL-DC)"
+    assert (line.cells[1].text, line.cells[1].note) == ("4", "4 shared")
+
+
+def test_logs_that_differ_are_a_reason_not_to_compare(tmp_path):
+    folders = [
+        make_fake_run(tmp_path / name, rows=(FakeRow("DC", "BL"),), recordings=count, windows=1)
+        for name, count in (("more", 3), ("fewer", 2))
+    ]
+    rows = [row for run in load_runs(folders) for row in run.rows]
+    ((line,),) = not_compared_table(score_rows(rows, np.random.default_rng(0), draws=2)).bodies
+    assert line.header == "BL-DC (fewer)"
+    assert line.cells[0].text == "the logs or their frames (against BL-DC (more))"
+    assert (line.cells[1].text, line.cells[1].note) == ("2", "2 shared")
+
+
+def test_where_all_targets_are_the_same_nothing_is_said(run):
+    assert not_compared_table(score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=2)) is None
+    assert not_compared_table({}) is None
 
 
 def test_a_row_is_set_against_the_one_with_the_fewest_other_settings(run):

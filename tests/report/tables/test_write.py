@@ -44,7 +44,7 @@ def test_every_result_is_there_for_machines_with_its_cost_and_windows(page):
     results = rows["ED-DC"]["results"]
     assert [result["seed"] for result in results] == [0, 1, 2]
     assert results[0]["train_seconds"] == 80.0
-    assert results[0]["config"]["model"] == "ED"
+    assert results[0]["config"]["model"] == "ed"
     windows = pd.read_csv(page.parent / "windows.csv").set_index("window_set")
     assert len(windows.loc[results[0]["windows_id"]]) == results[0]["window_count"] == 16
     assert rows["ED-NT"]["failure"] == "the loss became not a number in epoch 3"

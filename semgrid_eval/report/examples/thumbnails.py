@@ -18,7 +18,7 @@ _LOGS_KEPT = 64  # in memory
 T = TypeVar("T")
 
 
-class Glimpses:
+class RunThumbnails:
     """What one run kept of its logs."""
 
     def __init__(self, run: Run) -> None:

@@ -1,13 +1,13 @@
 from dataclasses import replace
 
-from semgrid_eval.report.examples.kept import Glimpses, times
+from semgrid_eval.report.examples.thumbnails import RunThumbnails, times
 from semgrid_eval.report.rows.load import load_runs
 
 
 def opened(folder, name="own-DC"):
     """What a run kept of its logs, and the shown result of a row."""
     (run,) = load_runs([folder])
-    return Glimpses(run), next(row for row in run.rows if row.record.name == name).shown
+    return RunThumbnails(run), next(row for row in run.rows if row.record.name == name).shown
 
 
 def test_pictures_of_a_log_are_found_by_its_path(seen):
@@ -30,7 +30,7 @@ def test_a_log_to_train_on_may_have_the_same_path_as_one_to_score(seen, tmp_path
     same_paths = tuple(log.model_copy(update={"digest": f"{i:016x}"}) for i, log in enumerate(run.record.logs))
     mixed = replace(run, record=run.record.model_copy(update={"logs": same_paths + run.record.logs}))
     result = run.rows[0].shown
-    assert Glimpses(mixed).of(result.record.windows[0].log, result) is not None
+    assert RunThumbnails(mixed).of(result.record.windows[0].log, result) is not None
 
 
 def test_times_can_be_pasted_into_viewers(seen):

@@ -1,0 +1,108 @@
+"""What settings of a model buy: score and time of rows that differ in one or two numeric settings alone."""
+
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
+from semgrid_eval.report.figures.style import INK, PALETTE, SETTINGS, Plot, evidence, finish, short
+from semgrid_eval.report.rows.pairing import HEADLINE
+from semgrid_eval.report.rows.varied import Varied, varied_settings
+
+COLUMNS = ("figure", "row", "setting", "value", "by", "by_value", "parameters", "iou", "low", "high", "window_ms")
+_ASIDE = 0.02  # of the axis: how far lines stand apart, so that their intervals can be told apart
+
+
+def settings_frame(scores: Scores) -> pd.DataFrame:
+    """Return one line for each row of each figure: `COLUMNS`."""
+    lines = []
+    for index, varied in enumerate(varied_settings(scores)):
+        for entry in varied.rows:
+            iou, record = entry.estimate(HEADLINE), entry.row.results[0].record
+            by = varied.keys[1] if len(varied.keys) > 1 else ""
+            values = (varied.keys[0], varied.value(entry), by, varied.value(entry, 1), record.parameters)
+            lines.append((_name(index), entry.row.name, *values, iou.value, iou.low, iou.high, _window_ms(entry)))
+    return pd.DataFrame(lines, columns=list(COLUMNS)).astype({"parameters": "Int64"})
+
+
+def settings_plots(scores: Scores) -> list[Plot]:
+    """Draw score and time against settings, and against each other, where rows differ in nothing else."""
+    return [_plot(varied, _name(index)) for index, varied in enumerate(varied_settings(scores))]
+
+
+def _plot(varied: Varied, name: str) -> Plot:
+    with mpl.rc_context(SETTINGS):
+        figure = Figure(figsize=(11.3, 3.4), layout="constrained")
+        score, time, front = panels = figure.subplots(1, 3)
+        for index, line in enumerate(lines := varied.lines()):
+            _draw_line(panels, varied, line, index, aside=index - (len(lines) - 1) / 2)
+        _front_line(front, varied.rows)
+        places = sorted({varied.value(entry) for entry in varied.rows})
+        for axes in (score, time):
+            axes.set_xticks(places, [f"{place:g}" for place in places])
+            axes.set_xlabel(_word(varied.keys[0]))
+            axes.margins(x=0.15)
+        slowest_ms = 1.1 * max(_window_ms(entry) for entry in varied.rows)
+        score.set(ylabel="mean class IoU without unknown")
+        time.set(ylabel="time of a prediction / ms", ylim=(0, slowest_ms))
+        front.set(xlabel="time of a prediction / ms", ylabel="mean class IoU without unknown", xlim=(0, slowest_ms))
+        front.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        return finish(figure, name, "settings.csv", _caption(varied))
+
+
+def _draw_line(panels: Sequence[Axes], varied: Varied, line: list[RowScores], index: int, *, aside: float) -> None:
+    """Draw the rows of one value of the second setting into the panels of score, time and both."""
+    score, time, front = panels
+    colour, label = PALETTE[index % len(PALETTE)], _label(varied, line[0])
+    places = [varied.value(entry) + aside * _ASIDE * varied.reach for entry in line]
+    estimates, times = [entry.estimate(HEADLINE) for entry in line], [_window_ms(entry) for entry in line]
+    for axes, x in ((score, places), (front, times)):
+        for at, estimate in zip(x, estimates, strict=True):
+            axes.plot([at, at], [estimate.low, estimate.high], color=colour, linewidth=0.8, alpha=0.7)
+    values = [estimate.value for estimate in estimates]
+    score.plot(places, values, "o-", color=colour, label=label, markersize=4)
+    time.plot(places, times, "o-", color=colour, label=label, markersize=4)
+    front.plot(times, values, "o", color=colour, label=label, markersize=4)
+    for entry, at, value in zip(line, times, values, strict=True):
+        text = f"{varied.value(entry):g}"
+        front.annotate(text, (at, value), (4, -9), textcoords="offset points", fontsize=7)
+
+
+def _front_line(axes: Axes, entries: Sequence[RowScores]) -> None:
+    """Join the rows that no other row beats in both time and score."""
+    points = sorted((_window_ms(entry), -entry.mean[HEADLINE]) for entry in entries)
+    front = [p for i, p in enumerate(points) if all(p[1] < before[1] for before in points[:i])]
+    axes.plot([ms for ms, _ in front], [-loss for _, loss in front], color=INK, linewidth=0.8, linestyle="--", zorder=0)
+
+
+def _window_ms(entry: RowScores) -> float:
+    return float(np.mean(entry.row.window_ms))
+
+
+def _label(varied: Varied, entry: RowScores) -> str:
+    """Name a line by its value of the second setting, or by the model where there is one line."""
+    if len(varied.keys) == 1:
+        return short(entry.row.record.facts.model)
+    return f"{_word(varied.keys[1])} {varied.value(entry, 1):g}"
+
+
+def _caption(varied: Varied) -> str:
+    rows = evidence({entry.row.name: entry for entry in varied.rows})
+    return (
+        f"Rows that differ in {' and '.join(varied.keys)} alone: score with 95% interval, time of a window's "
+        f"prediction, and both, where numbers are {_word(varied.keys[0])} and the dashed line joins the rows that "
+        f"none beats in both ({rows})."
+    )
+
+
+def _word(key: str) -> str:
+    """Name a setting by its last part."""
+    return key.rpartition(".")[2].replace("_", " ")
+
+
+def _name(index: int) -> str:
+    return f"settings-{index + 1}" if index else "settings"

@@ -1,0 +1,27 @@
+from semgrid_eval.report.rows.load import load_runs
+from semgrid_eval.report.rows.settings import changed_settings, changed_targets, settings_but
+
+
+def test_settings_are_compared_key_by_key():
+    before = {"settings.depth": 3, "settings.features": 64, "translate": True, "sensors": ["front"]}
+    after = {"settings.depth": 4, "settings.features": 64, "translate": False, "sensors": ["a", "b"], "clip": None}
+    assert list(changed_settings(before, after).values()) == [
+        "settings.depth 3 to 4",
+        "translate true to false",
+        "sensors front to a, b",
+        "clip not set to none",
+    ]
+    assert changed_settings(before, before) == {}
+
+
+def test_the_settings_that_decide_the_targets_are_told_apart():
+    before = {"grid.spec.cell_m": 0.5, "settings.depth": 3, "mask_mode": "exclude", "validation_split": "val"}
+    after = {"grid.spec.cell_m": 0.25, "settings.depth": 4, "mask_mode": "off", "validation_split": "val"}
+    assert changed_targets(before, after) == ["grid.spec.cell_m 0.5 to 0.25", "mask_mode exclude to off"]
+
+
+def test_rows_are_alike_but_for_a_setting(run):
+    rows = {row.name: row for row in load_runs([run])[0].rows}
+    assert settings_but(rows["BL-DC"]) != settings_but(rows["BL-NT"])
+    assert settings_but(rows["BL-DC"], "translate") == settings_but(rows["BL-NT"], "translate")
+    assert settings_but(rows["BL-DC"], "translate") != settings_but(rows["BL-Fuse"], "translate")
