@@ -21,6 +21,7 @@ FLOORS = [
     "runs",
     "playback",
     "report",
+    "api",
     "bench",
     "cli",
 ]

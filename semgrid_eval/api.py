@@ -1,0 +1,229 @@
+"""The public functions: from a log to grids, windows, scores, runs and reports, each in one call."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.config import parse_config
+from semgrid_eval.errors import ConfigError, InputError
+from semgrid_eval.executors import local_executor
+from semgrid_eval.grids.build import build_log
+from semgrid_eval.grids.recording import GridRecording
+from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.log.convert import ConversionSummary, Work
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.models.device import choose_device
+from semgrid_eval.models.model import Given, Model
+from semgrid_eval.models.network import Network, seeded_network
+from semgrid_eval.models.registry import find_model
+from semgrid_eval.models.training import train
+from semgrid_eval.runs.matrix import load_matrix
+from semgrid_eval.runs.options import RunOptions
+from semgrid_eval.runs.runner import run_matrix
+from semgrid_eval.scores.metrics.iou import confusion
+from semgrid_eval.scores.metrics.metric import column_names
+from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores.results import RunRecord
+from semgrid_eval.sources.known import SOURCES, load_source
+from semgrid_eval.windows.data import WindowSet, select_windows
+from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def convert(source: str, out: Path | str, *, workers: int = 1, **options: Any) -> ConversionSummary:  # noqa: ANN401
+    """Convert what a source offers to logs OUT/<split>/<name>.mcap; what is done already is kept.
+
+    Args:
+        source: `cityscapes`, `synthetic` or `town-v1`.
+        out: folder of the logs.
+        workers: logs at once.
+        options: those of the source's command, with underscores.
+
+    Raises:
+        ConfigError: there is no such source or option.
+        MissingExtraError: a package of its extra is not installed.
+    """
+    if source not in SOURCES:
+        raise ConfigError(f"{source!r} is not one of {', '.join(SOURCES)}", field="source")
+    found = load_source(source)
+    given = {name: str(value) if isinstance(value, Path) else value for name, value in options.items()}
+    work = Work(workers, local_executor(workers))
+    return found.convert(parse_config(found.options, given, path=source), Path(out), work)
+
+
+def open_log(path: Path | str) -> LogReader:
+    """Open a log, to be used in a `with` block: `frames`, `motion`, `calibration`, `pictures` and more.
+
+    Raises:
+        LogError: the file cannot be read, is damaged, or is not a log of this package.
+    """
+    return LogReader(Path(path))
+
+
+def build_grids(log: Path | str, config: GridConfig | None = None) -> list[GridRecording]:
+    """Make the semantic grids of all sensors of one log; a long log is cut into several recordings.
+
+    Raises:
+        LogError: the log is damaged or lacks what a grid needs.
+    """
+    return build_log(Path(log), config or GridConfig())
+
+
+def plot_grid(
+    grid: NDArray[np.uint8],
+    *,
+    mask: NDArray[np.bool_] | None = None,
+    spec: GridSpec | None = None,
+    axes: "Axes | None" = None,
+) -> "Axes":
+    """Draw a grid (H, W) of class ids in the report's colours, in metres around the vehicle, mask M in white.
+
+    Args:
+        grid: class ids.
+        mask: (H, W), drawn in white.
+        spec: extent of the grid.
+        axes: where to draw; axes of a new figure if not given.
+    """
+    from semgrid_eval.report.figures.grid import draw_grid  # so that matplotlib is imported only to plot
+
+    return draw_grid(grid, mask=mask, spec=spec or GridSpec(), axes=axes)
+
+
+def score(
+    target: NDArray[np.uint8], prediction: NDArray[np.uint8], *, mask: NDArray[np.bool_] | None = None
+) -> dict[str, float]:
+    """Score predicted class ids: grids (H, W) or (N, H, W), pooled -> IoU by class, category and merged category.
+
+    Args:
+        target: class ids.
+        prediction: class ids of the same shape.
+        mask: cells to leave out.
+
+    Raises:
+        InputError: shapes differ, or an id is not that of a class.
+    """
+    shape = np.shape(target)
+    left_out = np.zeros(shape, np.bool_) if mask is None else np.asarray(mask, np.bool_)
+    if len(shape) < 2 or not shape == np.shape(prediction) == left_out.shape:
+        raise InputError(f"shapes are {shape}, {np.shape(prediction)} and {left_out.shape}", field="score")
+    for name, grid in (("target", target), ("prediction", prediction)):
+        if np.size(grid) and not 0 <= np.min(grid) <= np.max(grid) < CLASS_COUNT:
+            raise InputError(f"has ids outside 0 to {CLASS_COUNT - 1}", field=name)
+    flat = (-1, *shape[-2:])
+    seen, guessed = (np.asarray(grid, np.uint8).reshape(flat) for grid in (target, prediction))
+    counts = confusion(seen, guessed, left_out.reshape(flat))
+    figures = IOU.figures(IOU.ratios(counts.sum(axis=0)))
+    return dict(zip(column_names(IOU), figures.tolist(), strict=True))
+
+
+def make_windows(
+    recordings: Sequence[GridRecording],
+    config: WindowConfig | None = None,
+    *,
+    sensors: Sequence[str] = (),
+    spec: GridSpec | None = None,
+    translate: bool = True,
+) -> WindowSet:
+    """Take every window of some recordings: inputs of the past, in the target's place, and the target.
+
+    Args:
+        recordings: as `build_grids` makes them, all of one configuration.
+        config: inputs, steps and horizon.
+        sensors: names of the inputs' sensors; that of the target if not given.
+        spec: extent of the grids.
+        translate: whether inputs are moved into the target's place.
+
+    Raises:
+        InputError: no recording is long enough, or there is no such sensor.
+    """
+    spec = spec or GridSpec()
+    data = stack_recordings(recordings, cell_m=spec.cell_m)
+    windows = training_windows(data.frame_counts, config or WindowConfig()).windows
+    return select_windows(data, windows, sensors=sensors or [data.target], translate=translate)
+
+
+def make_model(
+    model: str | type[Model], windows: WindowSet, settings: Mapping[str, Any] | None = None, *, seed: int = 0
+) -> Model:
+    """Make a model for windows of this kind: a name like `fuse` or `ed`, `path.py:Class`, or a class.
+
+    Raises:
+        InputError: there is no such model, or the settings are not its own.
+    """
+    made = find_model(model) if isinstance(model, str) else model
+    rows, columns = windows.data.grids.shape[-2:]
+    given = Given(windows.sensors, windows.inputs.shape[1], rows, columns, windows.data.cell_m, windows.translate)
+    chosen = parse_config(made.Settings, dict(settings or {}), path="settings")
+    made.check(chosen, given)
+    return seeded_network(made, chosen, given, seed) if issubclass(made, Network) else made(chosen, given)
+
+
+def fit(
+    model: Model,
+    windows: WindowSet,
+    *,
+    seed: int = 0,
+    device: str = "auto",
+    folder: Path | str | None = None,
+    validation: WindowSet | None = None,
+) -> Model:
+    """Fit a model to training windows and return it; one that does not learn is returned as it is.
+
+    Args:
+        model: as `make_model` makes it.
+        windows: to learn from.
+        seed: of the order of windows and whatever else chance decides.
+        device: `auto`, `cpu`, `cuda`, `cuda:1` ...
+        folder: keeps a network's checkpoint, history and weights, so that the same call goes on after a stop.
+        validation: windows whose loss is noted after each epoch.
+
+    Raises:
+        InputError: the folder belongs to another training or cannot be written to.
+        DivergedError: the loss is no longer a number.
+    """
+    if not isinstance(model, Network):
+        if model.learns():
+            model.fit(windows)
+        return model
+    with TemporaryDirectory() as temporary:
+        place = Path(folder or temporary)
+        return train(
+            model, windows, seed=seed, device=choose_device(device), folder=place, validation=validation
+        ).network
+
+
+def run(
+    matrix: str | Path,
+    logs: Path | str,
+    out: Path | str,
+    *,
+    device: str = "auto",
+    jobs: int = 1,
+    only: Sequence[str] = (),
+) -> RunRecord:
+    """Train and score every row of a matrix file or preset; what is done already is kept.
+
+    Args:
+        matrix: a preset's name or a YAML file.
+        logs: folder of logs.
+        out: folder of the run.
+        device: `auto`, `cpu`, `cuda`, `cuda:1` ...
+        jobs: rows at once, each in a process of its own.
+        only: names or patterns of rows, like `BL-*`; all if not given.
+
+    Raises:
+        InputError: there is no log at all, or the device does not exist.
+        ConfigError: the matrix is malformed; the message names file, row and key.
+    """
+    folder = Path(out)
+    executor = local_executor(jobs)
+    options = RunOptions(device, folder / "grids", "semgrid_eval.run", tuple(only), executor, executor)
+    return run_matrix(load_matrix(str(matrix)), Path(logs), folder, options)

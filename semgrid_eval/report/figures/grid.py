@@ -1,0 +1,39 @@
+"""One grid as a plot in metres around the vehicle."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, class_palette
+from semgrid_eval.grids.spec import GridSpec
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def draw_grid(
+    grid: NDArray[np.uint8],
+    *,
+    mask: NDArray[np.bool_] | None = None,
+    spec: GridSpec | None = None,
+    axes: "Axes | None" = None,
+) -> "Axes":
+    """Draw a grid (H, W) of class ids in the colour-blind-safe colours, mask M in white.
+
+    Args:
+        grid: class ids.
+        mask: (H, W), drawn in white.
+        spec: extent of the grid; the default one if not given.
+        axes: where to draw; axes of a new figure if not given.
+    """
+    spec = spec or GridSpec(rows=grid.shape[0], columns=grid.shape[1])
+    axes = Figure(layout="constrained").add_subplot() if axes is None else axes
+    palette = np.vstack([class_palette(safe=True), np.array([MASK_COLOUR], np.uint8)])
+    shown = grid if mask is None else np.where(mask, CLASS_COUNT, grid)
+    left_m, right_m = spec.agent_column * spec.cell_m, (spec.agent_column - spec.columns) * spec.cell_m
+    back_m, ahead_m = (spec.agent_row - spec.rows) * spec.cell_m, spec.agent_row * spec.cell_m
+    axes.imshow(palette[shown], extent=(left_m, right_m, back_m, ahead_m), interpolation="nearest")
+    axes.set(xlabel="left / m", ylabel="ahead / m")
+    return axes
