@@ -40,7 +40,10 @@ REGIONS = ("moving", "standing")
 
 
 class LogRecord(Config):
-    """A log that took part in a run; its path is below the folder of logs."""
+    """A log that took part in a run; its path is below the folder of logs.
+
+    Its group is the town, city or drive that it belongs to; empty where it stands for itself.
+    """
 
     name: str
     path: str
@@ -48,7 +51,7 @@ class LogRecord(Config):
     split: str
     dataset: str
     group: str = ""
-    fingerprint: str | None = None  # of a benchmark's log: what it is held against the published ones by
+    fingerprint: str | None = None  # of a benchmark's log: what is compared with the published ones
 
 
 class WindowRecord(Config):
