@@ -32,6 +32,8 @@ def load_source(name: str) -> Source[Any]:
     try:
         found = getattr(importlib.import_module(module), attribute)
     except ModuleNotFoundError as error:
+        if not extra:
+            raise
         raise MissingExtraError(extra, error.name or "a package") from error
     assert isinstance(found, Source)
     return found

@@ -19,7 +19,7 @@ ROWS = [{"name": "BL-DC", "model": "newest"}, {"name": "BL-broken", "model": "ab
 def toy(tmp_path, monkeypatch):
     """Let a toy world take the place of the town, one of whose logs is broken, and two rows that of the preset."""
 
-    def convert(config, out, **_):
+    def convert(config, out, work):
         for name in ("a", "b"):
             write_log(street(1, frames=9).recording(name), out / "val" / f"{name}.mcap")
         (out / "val" / "c.mcap").write_bytes(b"broken")
