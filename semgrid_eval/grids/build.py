@@ -21,7 +21,7 @@ from semgrid_eval.motion import EgoMotion
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.sensors.kinds import read_points
 from semgrid_eval.sensors.sensor import Points
-from semgrid_eval.sensors.together import Sight, see_together
+from semgrid_eval.sensors.synchronise import Snapshot, synchronise
 
 
 @dataclass
@@ -101,11 +101,11 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
 def _stretches(reader: LogReader, config: GridConfig) -> Iterator["_Stretch"]:
     motion = EgoMotion(reader.motion(), config.integrator)
     observations = read_points(reader, config.sensors, config.class_by_label())
-    sights = see_together(observations, config.sensors, config.target[0])
-    for number, first in enumerate(sights):
+    snapshots = synchronise(observations, config.sensors, config.target[0])
+    for number, first in enumerate(snapshots):
         stretch = _Stretch(motion, config)
-        for sight in chain([first], islice(sights, config.stretch_frames - 1)):
-            stretch.add(sight)
+        for snapshot in chain([first], islice(snapshots, config.stretch_frames - 1)):
+            stretch.add(snapshot)
         if number == 0 or len(stretch) == config.stretch_frames:
             yield stretch  # the rest of a log that was cut is too short for the windows of the others
 
@@ -122,12 +122,14 @@ class _Stretch:
     def __len__(self) -> int:
         return len(self._stamps_ns)
 
-    def add(self, sight: Sight) -> None:
+    def add(self, snapshot: Snapshot) -> None:
         """Add the next frame."""
-        self._stamps_ns.append(sight.stamp_ns)
-        here = self._first_from_vehicle(sight.stamp_ns)
+        self._stamps_ns.append(snapshot.stamp_ns)
+        here = self._first_from_vehicle(snapshot.stamp_ns)
         self._places.append(here)
-        rows = [[sight.points[name] for name in names if name in sight.points] for names in self._config.rows.values()]
+        rows = [
+            [snapshot.points[name] for name in names if name in snapshot.points] for names in self._config.rows.values()
+        ]
         self._grids.append(np.stack([self._grid(seen, here) for seen in rows]))
 
     def recording(self, reader: LogReader, truth: TrueActors) -> GridRecording:

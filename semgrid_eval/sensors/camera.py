@@ -67,7 +67,7 @@ class CameraSensor(SensorConfig):
         width, height = self.image_size_px
         return self.crop_px == (0, height, 0, width)
 
-    def is_of(self, other: "CameraSensor") -> bool:
+    def shares_image_with(self, other: "CameraSensor") -> bool:
         """Tell whether both are parts of one camera's image; who names no camera means a log's only one."""
         return self.camera == other.camera or None in (self.camera, other.camera)
 

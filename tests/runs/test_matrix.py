@@ -344,3 +344,27 @@ def test_facts_are_what_the_model_says(tmp_path):
         "fuse": ("BL", False, True),
         "flow": ("BL", False, True),
     }
+
+
+def test_rows_counted_from_the_bottom_turn_the_splits_upside_down():
+    rows = {row.name: row for row in load_matrix("sensitivity").rows}
+    down, up = rows["BL-Sp2"].grid.sensors, rows["BL-Sp2-rows-up"].grid.sensors
+    for end, other in (("upper", "lower"), ("lower", "upper")):
+        top, bottom, left, right = down[f"split2_{other}"].crop_px
+        assert up[f"split2_{end}"].crop_px == (256 - bottom, 256 - top, left, right)
+    assert up["full"] == down["full"]
+
+
+def test_a_row_without_sensors_sees_those_of_its_target(tmp_path):
+    file = tmp_path / "own.yaml"
+    file.write_text(
+        "rows:\n"
+        "  - {name: plain, model: newest}\n"
+        "  - name: both\n"
+        "    model: newest\n"
+        "    grid: {sensors: {left: {camera: left}, right: {camera: right}}, target: [right, left]}\n"
+    )
+    assert [row.sensors for row in load_matrix(str(file)).rows] == [("full",), ("right", "left")]
+    file.write_text("rows: [{name: plain, model: newest, grid: {sensors: {a: {}}}}]")
+    with pytest.raises(ConfigError, match="grid: target: 'full' is not one of the sensors a"):
+        load_matrix(str(file))

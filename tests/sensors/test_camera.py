@@ -62,8 +62,8 @@ def test_poses_are_those_of_the_cameras_own_times(log):
 
 
 def test_parts_belong_together_if_their_camera_is_the_same_or_the_only_one():
-    assert CameraSensor().is_of(CameraSensor(top_px=9))
-    assert CameraSensor(camera="rear").is_of(CameraSensor())
-    assert not CameraSensor(camera="rear").is_of(CameraSensor(camera="front"))
+    assert CameraSensor().shares_image_with(CameraSensor(top_px=9))
+    assert CameraSensor(camera="rear").shares_image_with(CameraSensor())
+    assert not CameraSensor(camera="rear").shares_image_with(CameraSensor(camera="front"))
     assert CameraSensor(bottom_px=256).is_whole_image
     assert not CameraSensor(bottom_px=255).is_whole_image

@@ -51,7 +51,7 @@ def blind_cells(track: Track, grid: GridConfig, sensors: Sequence[str], window: 
 def parts_of_shown(grid: GridConfig) -> dict[str, CameraSensor]:
     """Return the sensors that are parts of the image of the camera that leads the target, which a run keeps."""
     cameras = {name: sensor for name, sensor in grid.sensors.items() if isinstance(sensor, CameraSensor)}
-    return {name: sensor for name, sensor in cameras.items() if grid.camera and sensor.is_of(grid.camera)}
+    return {name: sensor for name, sensor in cameras.items() if grid.camera and sensor.shares_image_with(grid.camera)}
 
 
 def _cell_centres_m(spec: GridSpec) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from semgrid_eval.sensors.sensor import Points, SensorConfig
-from semgrid_eval.sensors.together import TOLERANCE_NS, see_together
+from semgrid_eval.sensors.synchronise import TOLERANCE_NS, synchronise
 
 MS = 1_000_000
 
@@ -16,8 +16,8 @@ def seen(name, *times_ms):
 def together(*observations, max_age_s=0.1):
     sensors = {name: SensorConfig(kind="any", max_age_s=max_age_s) for name in ("a", "b", "c")}
     merged = sorted(chain(*observations), key=lambda points: points.stamp_ns)
-    sights = see_together(merged, sensors, "a")
-    return [(s.stamp_ns // MS, {name: points.stamp_ns / MS for name, points in s.points.items()}) for s in sights]
+    snapshots = synchronise(merged, sensors, "a")
+    return [(s.stamp_ns // MS, {name: points.stamp_ns / MS for name, points in s.points.items()}) for s in snapshots]
 
 
 def test_the_newest_observation_at_or_before_the_leaders_time_counts():

@@ -10,7 +10,7 @@ TOLERANCE_NS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Sight:
+class Snapshot:
     """What all sensors have seen last at a time; a sensor without a recent observation is left out.
 
     Args:
@@ -22,7 +22,7 @@ class Sight:
     points: Mapping[str, Points]
 
 
-def see_together(observations: Iterable[Points], sensors: Mapping[str, SensorConfig], leader: str) -> Iterator[Sight]:
+def synchronise(observations: Iterable[Points], sensors: Mapping[str, SensorConfig], leader: str) -> Iterator[Snapshot]:
     """Iterate over the times of the leading sensor with the newest observation that each sensor had made by then.
 
     Args:
@@ -34,19 +34,19 @@ def see_together(observations: Iterable[Points], sensors: Mapping[str, SensorCon
     now: Points | None = None
     for points in observations:
         if now is not None and (points.sensor == leader or points.stamp_ns > now.stamp_ns + TOLERANCE_NS):
-            yield _sight(now, newest, sensors)
+            yield _snapshot(now, newest, sensors)
             now = None
         newest[points.sensor] = points
         if points.sensor == leader:
             now = points
     if now is not None:
-        yield _sight(now, newest, sensors)
+        yield _snapshot(now, newest, sensors)
 
 
-def _sight(now: Points, newest: Mapping[str, Points], sensors: Mapping[str, SensorConfig]) -> Sight:
+def _snapshot(now: Points, newest: Mapping[str, Points], sensors: Mapping[str, SensorConfig]) -> Snapshot:
     recent = {
         name: points
         for name, points in newest.items()
         if now.stamp_ns - points.stamp_ns <= sensors[name].max_age_s * 1e9
     }
-    return Sight(now.stamp_ns, recent)
+    return Snapshot(now.stamp_ns, recent)

@@ -1,0 +1,36 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.recordings import random_recording
+
+from semgrid_eval.arrays import read_arrays, write_arrays
+from semgrid_eval.errors import ResultError
+from semgrid_eval.grids.recording import GridRecording, read_recordings, write_recordings
+
+
+def stretches():
+    """Stretches of unequal lengths, the second without the truth."""
+    shared = {"digest": "d", "log": "here.mcap", "group": "town 3", "target": "low"}
+    recordings = [random_recording(i, frames=3 + i, size=8, sensors=("up", "low"), truth=i != 1) for i in range(3)]
+    return [replace(recording, **shared) for recording in recordings]
+
+
+def test_stretches_come_back_as_they_were(tmp_path):
+    written = stretches()
+    write_recordings(tmp_path / "kept.npz", written)
+    found = read_recordings(tmp_path / "kept.npz", Path("here.mcap"))
+    assert len(found) == 3
+    for one, same in zip(written, found, strict=True):
+        for name in GridRecording.__dataclass_fields__:
+            np.testing.assert_array_equal(getattr(one, name), getattr(same, name), err_msg=name)
+    assert [recording.actors is None for recording in found] == [False, True, False]
+
+
+def test_a_file_that_lacks_an_array_is_refused(tmp_path):
+    write_recordings(tmp_path / "kept.npz", stretches())
+    arrays = read_arrays(tmp_path / "kept.npz", ("log", "sensors", "names", "frames", "stamps_ns"))
+    write_arrays(tmp_path / "kept.npz", arrays)
+    with pytest.raises(ResultError, match="has no array has_truth"):
+        read_recordings(tmp_path / "kept.npz", Path("here.mcap"))
