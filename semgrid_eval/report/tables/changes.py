@@ -26,7 +26,7 @@ def changes_table(scores: Scores) -> Table | None:
 
 
 def changed_settings(before: Mapping[str, object], after: Mapping[str, object]) -> list[str]:
-    """List which flat settings differ: `network.depth 3 to 4`."""
+    """List which flat settings differ: `settings.depth 3 to 4`."""
     keys = [*before, *(key for key in after if key not in before)]
     pairs = [(key, before.get(key, _UNSET), after.get(key, _UNSET)) for key in keys]
     return [f"{key} {_text(first)} to {_text(second)}" for key, first, second in pairs if first != second]
