@@ -1,4 +1,4 @@
-"""`semgrid-eval run`: work off an experiment matrix."""
+"""`semgrid-eval run`: run an experiment matrix."""
 
 from collections.abc import Collection
 from pathlib import Path
