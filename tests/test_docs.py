@@ -8,10 +8,11 @@ import click
 import pytest
 import torch
 import yaml
-from semgrid_eval.models.predictor import load_predictor
+from support.models import made, network
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.cli.main import cli
+from semgrid_eval.models.registry import find_model
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.windows.data import WindowBatch
 
@@ -50,26 +51,37 @@ def test_commands_of_the_readme_parse(workplace, line):
     command.make_context(name, arguments)
 
 
-def test_matrices_of_the_readme_load(tmp_path):
+def test_matrices_of_the_readme_load(workplace):
+    Path("small.py").write_text(blocks("python")[0])
     loaded = 0
     for block in blocks("yaml"):
         if "rows:" in block:
-            (tmp_path / "m.yaml").write_text(block)
-            loaded += len(load_matrix(str(tmp_path / "m.yaml")).rows)
-    assert loaded == 8
+            Path("m.yaml").write_text(block)
+            loaded += len(load_matrix("m.yaml").rows)
+    assert loaded == 11
+
+
+def own_batch():
+    past = torch.randint(0, CLASS_COUNT, (2, 1, 2, 16, 16), dtype=torch.uint8)
+    empty = torch.zeros(2, 16, 16)
+    return WindowBatch(past, ("full",), torch.zeros(2, 2, 2), torch.zeros(2, 2), empty, empty.bool())
+
+
+def test_network_of_the_readme_gives_probabilities(tmp_path):
+    (tmp_path / "small.py").write_text(blocks("python")[0])
+    net = network(find_model(f"{tmp_path}/small.py:Small"), width=4)
+    torch.testing.assert_close(net.predict(own_batch()).sum(dim=1), torch.ones(2, 16, 16))
 
 
 def test_model_of_the_readme_loads_its_weights_and_gives_probabilities(tmp_path):
-    (tmp_path / "mine.py").write_text(blocks("python")[0])
+    (tmp_path / "mine.py").write_text(blocks("python")[1])
     keep = torch.nn.init.dirac_(torch.empty(CLASS_COUNT, CLASS_COUNT, 5, 5))  # each class stays where it is
     torch.save({"layer.weight": keep, "layer.bias": torch.zeros(CLASS_COUNT)}, tmp_path / "mine.pt")
-    past = torch.randint(0, CLASS_COUNT, (2, 1, 2, 8, 8), dtype=torch.uint8)
-    empty = torch.zeros(2, 8, 8)
-    batch = WindowBatch(past, ("full",), torch.zeros(2, 2, 2), torch.zeros(2, 2), empty, empty.bool())
+    batch = own_batch()
     with torch.inference_mode():
-        answer = load_predictor(f"{tmp_path}/mine.py:Mine")(batch)
-    assert torch.equal(answer.argmax(dim=1), past[:, 0, -1].long())
-    torch.testing.assert_close(answer.sum(dim=1), torch.ones(2, 8, 8))
+        answer = made(find_model(f"{tmp_path}/mine.py:Mine")).predict(batch)
+    assert torch.equal(answer.argmax(dim=1), batch.past[:, 0, -1].long())
+    torch.testing.assert_close(answer.sum(dim=1), torch.ones(2, 16, 16))
 
 
 @pytest.mark.parametrize("page", ["README.md", "ARCHITECTURE.md", "docs/town.md", "reports/README.md"])

@@ -32,7 +32,7 @@ _MEGABYTE = 1e6
 
 
 def measure_town(material: Material) -> Iterator[Measurement]:
-    """Build a town with its traffic, each time anew."""
+    """Build a town with its traffic, each time from the start."""
     settings, folder = material.settings, material.folder / "measured-towns"
     spec = TownSpec(0, KINDS[0].name, 0, settings.town_size_m, settings.duration_s)
 

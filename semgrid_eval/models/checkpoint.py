@@ -126,7 +126,8 @@ def save_weights(network: Network, path: Path, **notes: str) -> None:
         "given": asdict(network.given),
         **notes,
     }
-    tensors = {name: value.detach().cpu().contiguous() for name, value in network.state_dict().items()}
+    # Layers may share weights, which safetensors refuses to write.
+    tensors = {name: value.detach().cpu().contiguous().clone() for name, value in network.state_dict().items()}
     # One entry, because safetensors writes several in an order that changes from time to time.
     content = save(tensors, metadata={_HEADER: json.dumps(header, sort_keys=True)})
     with atomic_file(path) as stream:

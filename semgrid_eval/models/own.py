@@ -3,7 +3,7 @@
 import importlib.metadata
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -110,14 +110,21 @@ class _Guarded(Model):
         with self._guard():
             return self._checked(super().predict(batch), batch)
 
+    @classmethod
+    def in_words(cls, settings: Any) -> str:  # noqa: ANN401 - of the class `Settings`
+        with cls._guard():
+            return super().in_words(settings)
+
+    @classmethod
+    def check(cls, settings: Any, given: Given) -> None:  # noqa: ANN401 - of the class `Settings`
+        with cls._guard():
+            super().check(settings, given)
+
+    @classmethod
     @contextmanager
-    def _guard(self) -> Iterator[None]:
-        with _one_line(self._own_name):
-            if self._own_file is None:
-                yield
-            else:
-                with self._own_file.present():
-                    yield
+    def _guard(cls) -> Iterator[None]:
+        with _one_line(cls._own_name), cls._own_file.present() if cls._own_file else nullcontext():
+            yield
 
     def _checked(self, scores: Tensor, batch: WindowBatch) -> Tensor:
         fault = _fault(scores, batch)

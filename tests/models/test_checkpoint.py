@@ -29,6 +29,14 @@ def test_file_gives_the_same_weights_back(tmp_path, constants):
     assert header["given"]["inputs"] == 4
 
 
+def test_layers_may_share_their_weights(tmp_path):
+    net = small()
+    net.encoder[1][3] = net.decoder[0][0] = torch.nn.Conv2d(8, 8, 3)
+    save_weights(net, tmp_path / "a.safetensors")
+    load_weights(net, tmp_path / "a.safetensors")
+    assert net.encoder[1][3] is net.decoder[0][0]
+
+
 def test_damaged_missing_or_foreign_files_are_named(tmp_path):
     good, cut, foreign = (tmp_path / f"{name}.safetensors" for name in ("good", "cut", "foreign"))
     save_weights(small(), good)

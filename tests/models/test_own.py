@@ -8,7 +8,7 @@ from support.models import made, network
 from support.recordings import random_recording
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.models.model import Model
+from semgrid_eval.models.model import Model, NoSettings
 from semgrid_eval.models.network import Network
 from semgrid_eval.models.own import ENTRY_POINT_GROUP
 from semgrid_eval.models.registry import find_model, model_names, version_of
@@ -50,7 +50,9 @@ class Broken(Model):
         raise ValueError("weights are\\nmissing")
 
 class Silent(Model):
-    pass
+    @classmethod
+    def check(cls, settings, given):
+        settings.unheard_of
 
 class Untyped(Model):
     class Settings:
@@ -138,6 +140,8 @@ def test_model_that_cannot_be_made_or_fitted_is_named(own, batch):
         made(find_model(f"{own}:Counted")).fit(None)
     with pytest.raises(InputError, match=r"own_models\.py:Silent: raised NotImplementedError: Silent has no `predict`"):
         made(find_model(f"{own}:Silent")).predict(batch)
+    with pytest.raises(InputError, match=r"own_models\.py:Silent: raised AttributeError: .*unheard_of"):
+        find_model(f"{own}:Silent").check(NoSettings(), None)
 
 
 def test_a_declared_file_that_is_missing_is_named_and_another_is_another_version(own):

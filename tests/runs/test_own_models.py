@@ -177,6 +177,31 @@ def test_a_declared_file_that_is_missing_fails_its_row_alone(logs, tmp_path):
     assert record.rows[1].failure is None
 
 
+CHANCE = """
+import torch
+from semgrid_eval.models.model import Model, one_hot
+
+class Chance(Model):
+    random = True
+    files = ()
+
+    def predict(self, batch):
+        return one_hot(torch.randint(0, 10, batch.target.shape, dtype=torch.uint8))
+"""
+
+
+def test_a_model_that_declares_chance_is_repeated_with_seeds_and_each_gives_the_same_again(logs, tmp_path):
+    (tmp_path / "chance.py").write_text(CHANCE)
+    rows = [{"name": "own", "model": f"{tmp_path}/chance.py:Chance", "repeats": 2}]
+    counts = []
+    for name in ("one", "two"):
+        (row,) = run(rows, logs, tmp_path / name).rows
+        assert [results.read_result(results.result_folder(tmp_path / name, i)).seed for i in row.results] == [5, 6]
+        counts.append([results.read_counts(results.result_folder(tmp_path / name, i))[0].tolist() for i in row.results])
+    assert counts[0] == counts[1]
+    assert counts[0][0] != counts[0][1]
+
+
 FAULTY = """
 import torch
 from pathlib import Path
