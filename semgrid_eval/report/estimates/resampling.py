@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 Level = Literal["recordings", "groups"]
 
 DRAWS = 1000
-_REASONS: Mapping[Level, str] = {
-    "recordings": "recordings, which are taken to be independent of each other (--resample groups does not)",
-    "groups": "groups of recordings (towns, cities or drives) and then recordings within each group, since recordings "
-    "of one group may depend on each other",
+_SENTENCES: Mapping[Level, str] = {
+    "recordings": "Intervals come from resampling recordings, taken as independent of each other, and seeds where "
+    "there are several. To resample towns, cities or drives first (--resample groups) made no interval wider where it "
+    "was tried, on the towns of town-v1.",
+    "groups": "Intervals come from resampling groups of recordings (towns, cities or drives), then recordings within "
+    "each group, since recordings of one group may depend on each other, and seeds where there are several.",
 }
 
 
@@ -42,7 +44,7 @@ class Resampling:
     @property
     def sentence(self) -> str:
         """What intervals come from, and why."""
-        return f"Intervals come from resampling {_REASONS[self.level]}, and seeds where there are several."
+        return _SENTENCES[self.level]
 
     def draw(self, groups: Sequence[str], seed_counts: Iterable[int]) -> Draws:
         """Draw resamples of recordings, given the group of each (R,), and of seeds."""
