@@ -2,10 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from semgrid_eval.scores.metrics.metric import Counts, Floats, divided
 
 Level = Literal["recordings", "groups"]
 
@@ -25,6 +28,22 @@ class Draws:
 
     weights: NDArray[np.int64]
     picks: Mapping[int, NDArray[np.int64]]
+
+    def resampled(self, sums: Counts) -> Counts:
+        """Sum over recordings as often as each counts: (R, ...) -> (B, ...)."""
+        flat = sums.reshape(len(sums), -1).astype(np.float64)  # BLAS knows floats only; exact below 2**53
+        total = np.rint(self._floats @ flat).astype(np.int64)
+        return total.reshape(-1, *sums.shape[1:])
+
+    def over_seeds(self, values: Floats) -> Floats:
+        """Take the mean over the seeds that each resample picked: (B, S, Q) -> (B, Q)."""
+        present = np.isfinite(values) * self.picks[values.shape[1]][:, :, None]
+        total, number = (present * np.nan_to_num(values)).sum(axis=1), present.sum(axis=1)
+        return divided(total, number)
+
+    @cached_property
+    def _floats(self) -> Floats:
+        return self.weights.astype(np.float64)
 
 
 @dataclass(frozen=True)
