@@ -126,6 +126,11 @@ def score_all(rows: Sequence[Row], divisions: Sequence[Division], resampling: Re
     }
 
 
+def everywhere(everything: Everything, metric: str) -> Scores:
+    """Return the scores of all cells by a metric."""
+    return everything[metric][EVERYWHERE.name].get("all", {})
+
+
 def score_regions(rows: Sequence[Row], metric: Metric, division: Division, resampling: Resampling) -> dict[str, Scores]:
     """Score rows by a metric in each region of a division; regions and rows with nothing to count are left out."""
     sums = {row.name: row_sums(row, metric, division) for row in rows}
