@@ -70,7 +70,17 @@ def evaluate(
         chosen = slice(start, start + batch)
         seen = windows.batch(chosen)
         answer = _predict(model, seen)
-        scored = _scored(windows, chosen, seen, answer, mask_mode, spec)
+        prediction, left_out = apply_mask(answer.prediction, seen.mask.cpu().numpy(), mask_mode)
+        aligned = seen if windows.translate else replace(windows, translate=True).batch(chosen)
+        scored = ScoredWindows(
+            target=seen.target.cpu().numpy(),
+            prediction=prediction,
+            certainty=answer.certainty,
+            left_out=left_out,
+            inputs=aligned.past.cpu().numpy(),
+            actors=windows.actors(chosen),
+            spec=spec,
+        )
         parts.append(replace(answer, sums=count_windows(scored)))
         progress(min(start + batch, len(windows)), len(windows))
     return Evaluation(
@@ -91,23 +101,6 @@ def _predict(model: Model, seen: WindowBatch) -> Evaluation:
     seconds = time.perf_counter() - start_s
     levels = (certainty.float().clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy()
     return Evaluation({}, answer, levels, seconds)
-
-
-def _scored(
-    windows: WindowSet, chosen: slice, seen: WindowBatch, answer: Evaluation, mask_mode: MaskMode, spec: GridSpec
-) -> ScoredWindows:
-    """Gather what metrics see of the chosen windows."""
-    aligned = seen if windows.translate else replace(windows, translate=True).batch(chosen)
-    prediction, left_out = apply_mask(answer.prediction, seen.mask.cpu().numpy(), mask_mode)
-    return ScoredWindows(
-        target=seen.target.cpu().numpy(),
-        prediction=prediction,
-        certainty=answer.certainty,
-        left_out=left_out,
-        inputs=aligned.past.cpu().numpy(),
-        actors=windows.actors(chosen),
-        spec=spec,
-    )
 
 
 def _usual_spec(windows: WindowSet) -> GridSpec:

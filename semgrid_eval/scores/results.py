@@ -42,17 +42,14 @@ NOT_RUN = "not run yet"
 
 
 class LogRecord(Config):
-    """A log that took part in a run; its path is below the folder of logs.
-
-    Its group is the town, city or drive that it belongs to; empty where it stands for itself.
-    """
+    """A log that took part in a run; its path is below the folder of logs."""
 
     name: str
     path: str
     digest: str
     split: str
     dataset: str
-    group: str = ""
+    group: str = ""  # the town, city or drive that it belongs to; empty where it stands for itself
     fingerprint: str | None = None  # of a benchmark's log: what is compared with the published ones
 
 
@@ -253,11 +250,7 @@ def read_sums(folder: Path, metric: str, partition: str) -> NDArray[np.int32] | 
 
 
 def check_sums(folder: Path, windows: int) -> None:
-    """Read everything that was counted, and forget it.
-
-    Raises:
-        ResultError: it is missing, malformed or of another number of windows.
-    """
+    """Read everything that was counted, and forget it; a ResultError says what is missing or malformed."""
     for key, found in _read_sums(folder, list(product(METRICS, PARTITIONS))).items():
         if len(found) != windows:
             fault = f"has {len(found)} windows, and result.json {windows}"
@@ -265,11 +258,7 @@ def check_sums(folder: Path, windows: int) -> None:
 
 
 def read_counts(folder: Path) -> NDArray[np.int32]:
-    """Read the confusion counts of all cells of a result: (N, C, C).
-
-    Raises:
-        ResultError: they are missing or malformed.
-    """
+    """Read the confusion counts of all cells of a result: (N, C, C); a ResultError says what is wrong with them."""
     counts = read_sums(folder, "iou", "all")
     assert counts is not None  # all cells are always counted
     return counts[:, 0]
@@ -285,18 +274,13 @@ def _read_sums(folder: Path, keys: Sequence[tuple[str, str]]) -> dict[tuple[str,
     path, names = folder / SUMS_FILE, {key: ".".join(key) for key in keys}
     needed = tuple(name for key, name in names.items() if key[1] == "all")
     found = read_arrays(path, needed, optional=tuple(name for name in names.values() if name not in needed))
-    for (metric, partition), name in names.items():
-        if name in found:
-            shape = (len(PARTITIONS[partition].regions), *METRICS[metric].shape)
-            _check_counted(found[name], shape, path, name)
-    return {key: found[name] for key, name in names.items() if name in found}
-
-
-def _check_counted(found: NDArray[Any], shape: tuple[int, ...], path: Path, name: str) -> None:
-    if found.shape[1:] != shape or found.dtype != np.int32:
-        raise ResultError(f"has shape {found.shape}, type {found.dtype}", path=path, field=name)
-    if found.min(initial=0) < 0:
-        raise ResultError("is negative", path=path, field=name)
+    sums = {key: found[name] for key, name in names.items() if name in found}
+    for (metric, partition), counted in sums.items():
+        shape = (len(PARTITIONS[partition].regions), *METRICS[metric].shape)
+        if counted.shape[1:] != shape or counted.dtype != np.int32 or counted.min(initial=0) < 0:
+            fault = f"has shape {counted.shape}, type {counted.dtype}, or is negative"
+            raise ResultError(fault, path=path, field=names[metric, partition])
+    return sums
 
 
 def _check_version(found: int, path: Path) -> None:

@@ -14,8 +14,8 @@ from semgrid_eval.scores.regions.partition import Partition
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.results import ResultRecord, read_result, read_run, read_sums, result_folder
 
-FIGURE_COLUMNS = ("row", "seed", "metric", "partition", "region", "column", "value", "cells", "windows")
-WINDOW_COLUMNS = ("row", "seed", "recording", "window", "metric", "partition", "region", "ratio")
+FIGURE_COLUMNS = ("row", "seed", "metric", "division", "region", "column", "value", "cells", "windows")
+WINDOW_COLUMNS = ("row", "seed", "recording", "window", "metric", "division", "region", "ratio")
 
 
 class _Counted(NamedTuple):
@@ -30,7 +30,7 @@ class _Counted(NamedTuple):
     def keyed(self, frame: pd.DataFrame) -> pd.DataFrame:
         """Say in a frame what its numbers belong to."""
         seed = pd.array([self.record.seed] * len(frame), dtype="Int64")
-        return frame.assign(row=self.row, seed=seed, metric=self.metric.name, partition=self.partition.name)
+        return frame.assign(row=self.row, seed=seed, metric=self.metric.name, division=self.partition.name)
 
 
 def load_figures(

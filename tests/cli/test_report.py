@@ -27,3 +27,13 @@ def test_report_of_no_run_is_one_line(tmp_path, capsys):
     assert (code, out) == (1, "")
     assert err.count("\n") == 1
     assert str(tmp_path) in err
+
+
+def test_report_resamples_groups_where_it_is_asked_to(tmp_path, capsys):
+    run = make_fake_run(tmp_path / "run", rows=(FakeRow("DC", "BL"),), recordings=2, windows=1)
+    code, out, _ = _run(capsys, "report", run, "--resample", "groups")
+    assert code == 0
+    assert "resampling groups of recordings" in Path(out.strip()).with_name("report.json").read_text()
+    code, _, err = _run(capsys, "report", run, "--resample", "cells")
+    assert code == 2
+    assert "'recordings', 'groups'" in err

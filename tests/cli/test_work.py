@@ -63,7 +63,6 @@ def test_convert_grids_and_run_do_on_ray_what_they_do_here(here):
     assert rows == again
     for row in rows:
         counts = [
-            (result_folder(here / where / "run", row.results[0]) / "counts.npz").read_bytes()
-            for where in ("here", "ray")
+            (result_folder(here / where / "run", row.results[0]) / "sums.npz").read_bytes() for where in ("here", "ray")
         ]
         assert counts[0] == counts[1]

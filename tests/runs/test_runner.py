@@ -85,10 +85,10 @@ def test_a_second_start_does_nothing_and_a_lost_result_is_made_again_alike(logs,
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file() and path.name != "run.json"}
     run(rows, logs, out)
     assert before == {path: path.stat().st_mtime_ns for path in before}
-    counts, text = (folder / "counts.npz").read_bytes(), json.loads((folder / "result.json").read_text())
-    (folder / "counts.npz").write_bytes(counts[:100])
+    counts, text = (folder / "sums.npz").read_bytes(), json.loads((folder / "result.json").read_text())
+    (folder / "sums.npz").write_bytes(counts[:100])
     run(rows, logs, out)
-    assert (folder / "counts.npz").read_bytes() == counts
+    assert (folder / "sums.npz").read_bytes() == counts
     again = json.loads((folder / "result.json").read_text())
     del text["predict_seconds"], again["predict_seconds"]
     assert text == again
@@ -188,7 +188,7 @@ def test_several_processes_give_the_same_bytes_as_one(logs, tmp_path):
     assert [(row.results, row.failure) for row in one.rows] == [(row.results, row.failure) for row in several.rows]
     for row in one.rows:
         for result_id in row.results:
-            for name in ("counts.npz", "predictions.npz"):
+            for name in ("sums.npz", "predictions.npz"):
                 first, second = (results.result_folder(tmp_path / run, result_id) / name for run in ("one", "several"))
                 assert first.exists() == second.exists()
                 assert not first.exists() or first.read_bytes() == second.read_bytes()

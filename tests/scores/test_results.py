@@ -44,7 +44,7 @@ def test_sums_without_the_truth_have_no_actors(tmp_path):
         (lambda sums: sums[:, :1], r"iou\.actors: has shape \(3, 1, 10, 10\)"),
         (lambda sums: sums.astype(np.int64), r"iou\.actors: has shape .* type int64"),
         (lambda sums: sums[:2], r"iou\.actors: has 2 windows, and result\.json 3"),
-        (lambda sums: sums - 1, r"iou\.actors: is negative"),
+        (lambda sums: sums - 1, r"iou\.actors: has shape .*, or is negative"),
     ],
 )
 def test_malformed_sums_are_named(tmp_path, change, message):

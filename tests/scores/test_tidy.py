@@ -22,7 +22,7 @@ def test_every_figure_of_every_result_is_there_once(run):
     figures = load_figures(run)
     regions = sum(len(partition.regions) for partition in PARTITIONS.values())
     assert len(figures) == 3 * regions * sum(len(metric.columns) for metric in METRICS.values())
-    assert not figures.duplicated(["row", "seed", "metric", "partition", "region", "column"]).any()
+    assert not figures.duplicated(["row", "seed", "metric", "division", "region", "column"]).any()
     assert figures[figures.row == "BL-DC"].seed.isna().all()
     assert sorted(figures[figures.row == "ED-DC"].seed.unique()) == [0, 1]
 

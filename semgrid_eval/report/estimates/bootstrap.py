@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.estimates.resampling import DRAWS, Draws, Resampling
@@ -122,6 +121,11 @@ def score_all(rows: Sequence[Row], divisions: Sequence[Division], resampling: Re
     }
 
 
+def everywhere(everything: Everything, metric: str) -> Scores:
+    """Return the scores of all cells by a metric."""
+    return everything[metric][EVERYWHERE.name].get("all", {})
+
+
 def score_regions(rows: Sequence[Row], metric: Metric, division: Division, resampling: Resampling) -> dict[str, Scores]:
     """Score rows by a metric in each region of a division; regions and rows with nothing to count are left out."""
     sums = {row.name: row_sums(row, metric, division) for row in rows}
@@ -140,26 +144,13 @@ def _score_region(
     groups = {name: group for row in rows for name, group in sums[row.name].groups.items()}
     names = sorted(groups)
     draws = resampling.draw([groups[name] for name in names], [len(sums[row.name].results) for row in rows])
-    weights = draws.weights.astype(np.float64)  # BLAS knows floats only; exact below 2**53
-    return {row.name: _score_row(row, sums[row.name], metric, names, draws, weights) for row in rows}
+    return {row.name: _score_row(row, sums[row.name], metric, names, draws) for row in rows}
 
 
-def _score_row(
-    row: Row, sums: RegionSums, metric: Metric, names: Sequence[str], draws: Draws, weights: Floats
-) -> RowScores:
-    by_recording = sums.by_recording(names)  # (R, S, K, 2)
-    flat = by_recording.reshape(len(names), -1).astype(np.float64)
-    resampled = np.rint(weights @ flat).astype(np.int64).reshape(-1, *by_recording.shape[1:])
+def _score_row(row: Row, sums: RegionSums, metric: Metric, names: Sequence[str], draws: Draws) -> RowScores:
     by_seed = metric.figures(metric.ratios(sums.totals))
-    drawn = _over_seeds(metric.figures(resampled), draws.picks[len(sums.results)])
-    return RowScores(row, metric, sums.results, by_seed, drawn, sums.totals, sums.windows)
-
-
-def _over_seeds(values: Floats, picks: NDArray[np.int64]) -> Floats:
-    """Take the mean over the seeds that each resample picked: (B, S, Q) and (B, S) -> (B, Q)."""
-    present = np.isfinite(values) * picks[:, :, None]
-    total, number = (present * np.nan_to_num(values)).sum(axis=1), present.sum(axis=1)
-    return np.asarray(np.divide(total, number, out=np.full(total.shape, np.nan), where=number > 0))
+    resampled = draws.over_seeds(metric.figures(draws.resampled(sums.by_recording(names))))
+    return RowScores(row, metric, sums.results, by_seed, resampled, sums.totals, sums.windows)
 
 
 def _estimate(value: float, draws: Floats) -> Estimate:

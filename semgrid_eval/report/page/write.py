@@ -13,61 +13,26 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_folder
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.report.claims.claims import MARGIN
-from semgrid_eval.report.claims.findings import Finding, find, finding_table, missing_table, sentence
+from semgrid_eval.report.claims.findings import Finding, finding_table, missing_table, sentence
 from semgrid_eval.report.claims.paper import in_paper
-from semgrid_eval.report.estimates.bootstrap import Everything, Parts, Scores, score_all
-from semgrid_eval.report.estimates.division import Division
+from semgrid_eval.report.estimates.bootstrap import Parts, Scores
 from semgrid_eval.report.estimates.paces import EDGES_MPS
 from semgrid_eval.report.estimates.resampling import Level, Resampling
-from semgrid_eval.report.estimates.table import divisions
 from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
-from semgrid_eval.report.figures import bars, calibration, horizon, settings, training
-from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.page import provenance
 from semgrid_eval.report.page.colours import class_style
+from semgrid_eval.report.page.material import Material, gather
 from semgrid_eval.report.page.summary import summarise
-from semgrid_eval.report.rows.load import Row, Run, load_runs
+from semgrid_eval.report.rows.load import Row, load_runs
 from semgrid_eval.report.rows.pairing import Headline, headline
 from semgrid_eval.report.tables import write as exports
 from semgrid_eval.report.tables.divisions import division_tables
 from semgrid_eval.report.tables.scores import confusion_table, score_tables
 from semgrid_eval.report.tables.table import Table
-from semgrid_eval.report.tables.write import Numbers
 
 PAGE = "index.html"
 _SEED = 20190623  # any number does; a fixed one gives the same run the same intervals
-
-
-@dataclass(frozen=True)
-class Material:
-    """All that a report is written from.
-
-    Args:
-        runs: the runs as read from disk.
-        divisions: what is scored apart: regions of cells, and kinds of windows.
-        everything: scores by metric, division and region, of all rows that have some.
-        resampling: how their intervals were made.
-        findings: what the runs say about the paper's claims.
-        figures: by section of the page.
-    """
-
-    runs: Sequence[Run]
-    divisions: Sequence[Division]
-    everything: Everything
-    resampling: Resampling
-    findings: Sequence[Finding]
-    figures: Mapping[str, Sequence[Plot]]
-
-    @property
-    def scores(self) -> Scores:
-        """The IoU of all cells."""
-        return self.parts["all"].get("all", {})
-
-    @property
-    def parts(self) -> Mapping[str, Parts]:
-        """The IoU by division and region: `parts["actors"]["moving"]`."""
-        return self.everything["iou"]
 
 
 def write_report(
@@ -92,35 +57,11 @@ def write_report(
     material = gather(load_runs(folders, progress=progress), Resampling(_SEED, level=resample))
     tables = page_tables(material)
     with atomic_folder(out) as folder:
-        exports.write_numbers(
-            folder, Numbers(material.runs, material.everything, material.resampling, material.findings)
-        )
+        exports.write_numbers(folder, material)
         exports.write_tables(folder, all_tables(tables))
         exports.write_figures(folder, material.figures)
         (folder / PAGE).write_text(render_page(material, tables), encoding="utf-8")
     return out / PAGE
-
-
-def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
-    """Work out everything that a report shows."""
-    rows = [row for each in runs for row in each.rows]
-    parts = divisions(runs)
-    everything = score_all(rows, parts, resampling)
-    scores = everything["iou"]["all"].get("all", {})
-    figures = draw_figures(everything, rows)
-    return Material(runs, parts, everything, resampling, find(runs, scores, everything["iou"]["actors"]), figures)
-
-
-def draw_figures(everything: Everything, rows: Sequence[Row]) -> dict[str, list[Plot]]:
-    """Draw all figures by section of the page."""
-    scores, certainty = (everything[metric]["all"].get("all", {}) for metric in ("iou", "calibration"))
-    return {
-        "categories": bars.category_plots(scores),
-        "horizon": horizon.horizon_plots(scores),
-        "training": training.training_plots(rows),
-        "calibration": calibration.calibration_plots(certainty),
-        "settings": settings.settings_plots(scores),
-    }
 
 
 @dataclass(frozen=True)

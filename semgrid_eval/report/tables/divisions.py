@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from semgrid_eval.report.estimates.bootstrap import Everything, Parts
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.tables.table import Table
-from semgrid_eval.report.tables.values import part_differences, part_values
+from semgrid_eval.report.tables.values import difference_table, part_differences, part_values, value_table
 from semgrid_eval.scores.metrics.metric import Metric
 from semgrid_eval.scores.metrics.table import IOU, METRICS
 
@@ -25,14 +25,17 @@ def division_tables(everything: Everything, divisions: Sequence[Division]) -> di
 
 def _tables(metric: Metric, division: Division, parts: Parts) -> list[Table]:
     columns = division.columns(metric)
-    if not columns:
+    if not columns or not parts:
         return []
     name = division.name if metric is IOU else f"{division.name}-{metric.name}"
-    values = f"{metric.title} {division.words}, with 95% interval. Best of each in bold."
-    differences = f"Differences to the baseline {division.words}, resampled together: {metric.title}."
-    differences += " Marked where the interval excludes zero."
-    found = (
-        part_values(name, values, parts, columns),
-        part_differences(f"{name}-differences", differences, parts, columns),
-    )
-    return [table for table in found if table is not None]
+    what = f"{metric.title} {division.words}".rstrip()
+    values = f"{what}, with 95% interval. Best of each in bold."
+    differences = f"{what}: differences to the baseline, resampled together. Marked where the interval excludes zero."
+    if len(division.regions) == 1:
+        (scores,) = parts.values()
+        shown = value_table(name, values, scores, columns)
+        gaps = difference_table(f"{name}-differences", differences, scores, columns)
+    else:
+        shown = part_values(name, values, parts, columns)
+        gaps = part_differences(f"{name}-differences", differences, parts, columns)
+    return [table for table in (shown, gaps) if table is not None]

@@ -51,17 +51,16 @@ def run_differences(name: str, caption: str, scores: Scores, columns: Sequence[s
     return _differences(name, caption, [(entry, other) for entry, other in pairs if entry is not other], columns)
 
 
-def part_values(name: str, caption: str, parts: Parts, columns: Sequence[str]) -> Table | None:
-    """Show the scores of all regions beside each other; None where there are none."""
-    return _side_by_side(
-        name, caption, {part: value_table("", "", scores, columns) for part, scores in parts.items()}, len(columns)
-    )
+def part_values(name: str, caption: str, parts: Parts, columns: Sequence[str]) -> Table:
+    """Show the scores of all regions beside each other."""
+    return _side_by_side(name, caption, {part: value_table("", "", each, columns) for part, each in parts.items()})
 
 
 def part_differences(name: str, caption: str, parts: Parts, columns: Sequence[str]) -> Table | None:
-    """Show rows' paired differences to their baselines alike."""
+    """Show rows' paired differences to their baselines alike; None where no row has one."""
     tables = {part: difference_table("", "", scores, columns) for part, scores in parts.items()}
-    return _side_by_side(name, caption, {part: table for part, table in tables.items() if table}, len(columns))
+    found = {part: table for part, table in tables.items() if table}
+    return _side_by_side(name, caption, found) if found else None
 
 
 def reference_scores(entry: RowScores, scores: Scores) -> RowScores | None:
@@ -93,7 +92,7 @@ def evidence(entry: RowScores, column: str) -> str:
     """Say what stands behind a number, for its tooltip."""
     parts = [
         f"{entry.row.name}, {column_of(entry.metric, column).label}: {number(entry.mean[column])}",
-        plural(entry.cells[column], "target cell"),
+        plural(entry.cells[column], "cell"),
         plural(entry.windows, "window"),
         seeds(entry),
         interval_phrase(entry.estimate(column)),
@@ -167,16 +166,14 @@ def _headers(scores: Scores, columns: Sequence[str]) -> tuple[tuple[str, str], .
     return tuple((column_of(first.metric, c).label, f"{short_count(first.cells[c])} cells") for c in columns)
 
 
-def _side_by_side(name: str, caption: str, parts: Mapping[str, Table], width: int) -> Table | None:
-    """Join tables of that many columns by the headers of their lines, with dashes where one of them lacks a line."""
-    if not parts:
-        return None
+def _side_by_side(name: str, caption: str, parts: Mapping[str, Table]) -> Table:
+    """Join tables of the same columns by the headers of their lines, with dashes where one of them lacks a line."""
     columns = tuple((label, f"{part}, {note}") for part, table in parts.items() for label, note in table.columns)
-    lines = {part: {body[0].header: body[0] for body in table.bodies} for part, table in parts.items()}
-    headers = dict.fromkeys(header for found in lines.values() for header in found)
-    bodies = []
-    for header in headers:
-        absent = Line(header, (Cell(ABSENT),) * width)
-        cells = tuple(cell for found in lines.values() for cell in found.get(header, absent).cells)
-        bodies.append((Line(header, cells),))
-    return Table(name, caption, next(iter(parts.values())).corner, columns, tuple(bodies))
+    lines = {part: {body[0].header: body[0].cells for body in table.bodies} for part, table in parts.items()}
+    first = next(iter(parts.values()))
+    absent = (Cell(ABSENT),) * len(first.columns)
+    bodies = tuple(
+        (Line(header, tuple(cell for found in lines.values() for cell in found.get(header, absent))),)
+        for header in dict.fromkeys(header for found in lines.values() for header in found)
+    )
+    return Table(name, caption, first.corner, columns, bodies)

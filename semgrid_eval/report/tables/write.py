@@ -1,20 +1,19 @@
 """The report's files beside the page: long tables, the page's own in several formats, figures and report.json."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from semgrid_eval import __version__
 from semgrid_eval.files import write_json, write_text
-from semgrid_eval.report.claims.findings import Finding, finding_frame, finding_records
+from semgrid_eval.report.claims.findings import finding_frame, finding_records
 from semgrid_eval.report.claims.scaling import scaling
-from semgrid_eval.report.estimates.bootstrap import LEVEL, Everything
-from semgrid_eval.report.estimates.resampling import Resampling
+from semgrid_eval.report.estimates.bootstrap import LEVEL, everywhere
 from semgrid_eval.report.figures.calibration import calibration_frame
 from semgrid_eval.report.figures.settings import settings_frame
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.figures.training import training_frame
+from semgrid_eval.report.page.material import Material
 from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
 from semgrid_eval.report.rows.load import Result, Row, Run
 from semgrid_eval.report.tables.formats.csv import frame_csv
@@ -27,26 +26,15 @@ FORMAT_VERSION = 3
 _UNSCORED: dict[str, Any] = {"windows": 0, "seeds": 0, "cells": {}, "scores": {}, "reference": None, "differences": {}}
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """All that is written for machines: runs, every score, how it was resampled, and what it says of the claims."""
-
-    runs: Sequence[Run]
-    everything: Everything
-    resampling: Resampling
-    findings: Sequence[Finding]
-
-
-def write_numbers(folder: Path, numbers: Numbers) -> None:
+def write_numbers(folder: Path, material: Material) -> None:
     """Write the long tables as CSV, each run's matrix and report.json."""
-    runs, scores = numbers.runs, numbers.everything["iou"]["all"].get("all", {})
-    records = division_records(numbers.everything)
+    runs, records = material.runs, division_records(material.everything)
     frames = {
         "summary": summary_frame(records),
-        "scores": seed_frame(numbers.everything),
-        "findings": finding_frame(numbers.findings),
-        "calibration": calibration_frame(numbers.everything["calibration"]["all"].get("all", {})),
-        "settings": settings_frame(scores),
+        "scores": seed_frame(material.everything),
+        "findings": finding_frame(material.findings),
+        "calibration": calibration_frame(everywhere(material.everything, "calibration")),
+        "settings": settings_frame(material.scores),
         "training": training_frame([row for run in runs for row in run.rows]),
         "windows": window_frame(runs),
     }
@@ -54,7 +42,7 @@ def write_numbers(folder: Path, numbers: Numbers) -> None:
         write_text(folder / f"{name}.csv", frame_csv(frame))
     for run in runs:
         write_text(folder / matrix_file(run, runs), matrix_text(run))
-    write_json(folder / RECORD, report_record(numbers, records))
+    write_json(folder / RECORD, report_record(material, records))
 
 
 def write_tables(folder: Path, tables: Sequence[Table]) -> None:
@@ -75,9 +63,9 @@ def write_figures(folder: Path, figures: Mapping[str, Sequence[Plot]]) -> None:
         (folder / "figures" / f"{plot.name}.svg").write_text(plot.svg, encoding="utf-8")
 
 
-def report_record(numbers: Numbers, records: Mapping[str, Any]) -> dict[str, Any]:
+def report_record(material: Material, records: Mapping[str, Any]) -> dict[str, Any]:
     """Return everything a machine may want to know of a report; absent values are null."""
-    runs, resampling = numbers.runs, numbers.resampling
+    runs, resampling = material.runs, material.resampling
     scored = records.get("iou", {}).get("all", {}).get("all", {})
     interval = {"level": LEVEL, "draws": resampling.draws, "over": resampling.level, "why": resampling.sentence}
     return {
@@ -88,7 +76,7 @@ def report_record(numbers: Numbers, records: Mapping[str, Any]) -> dict[str, Any
         "failures": [vars(failure) for failure in failures(runs)],
         "rows": {row.name: _row_facts(row) | scored.get(row.name, _UNSCORED) for run in runs for row in run.rows},
         "metrics": records,
-        "findings": finding_records(numbers.findings),
+        "findings": finding_records(material.findings),
     }
 
 

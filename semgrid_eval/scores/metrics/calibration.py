@@ -38,13 +38,14 @@ class Calibration:
     """Cells that are predicted to be known, in bins of certainty: cells, right ones and their levels of certainty.
 
     Cells that are left unknown would drown all others. To keep those of them that the target knows would keep the
-    wrong ones alone, and make an honest model look overconfident.
+    wrong ones alone, and make an honest model look overconfident. The error of a resample is that of the cells and
+    that of the draw, both counted as positive: its interval may lie above the value of a model that has hardly any.
     """
 
     name = "calibration"
-    title = "Certainty of the cells that are predicted to be known"
+    title = "Calibration on cells predicted to be known (noise only adds to the error, so its intervals lie high)"
     columns = (
-        Column("calibration_error", "Expected calibration error", "lower"),
+        Column("calibration_error", "Expected error (lower is better)", "lower"),
         Column("precision", "Right"),
         Column("certainty", "Mean certainty", ""),
     )

@@ -11,4 +11,4 @@ def _number(scored: ScoredWindows) -> NDArray[np.int64]:
     return np.zeros(scored.target.shape, np.int64)
 
 
-EVERYWHERE = Partition("all", ("all",), "of all cells", _number)
+EVERYWHERE = Partition("all", ("all",), "", _number)

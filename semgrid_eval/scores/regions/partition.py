@@ -18,7 +18,7 @@ class Partition:
     Args:
         name: in files and columns.
         regions: names of the regions, as a reader sees them.
-        words: which cells the regions hold, to follow "IoU".
+        words: which cells the regions hold, to follow "IoU"; empty where it is all of them.
         number: numbers the region of each cell (N, H, W), -1 where it is in none; None where windows do not tell.
         shown: what a report shows of it: columns by metric; of a metric that is not named, nothing.
     """

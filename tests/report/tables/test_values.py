@@ -142,7 +142,6 @@ def test_a_row_that_lacks_one_region_has_dashes_there():
 
 
 def test_without_regions_there_is_nothing_to_show():
-    assert part_values("", "", {}, SHOWN) is None
     assert part_differences("", "", {}, SHOWN) is None
 
 
