@@ -62,7 +62,7 @@ def test_a_run_leaves_results_that_parse_and_belong_together(logs, tmp_path):
         assert [window.recording for window in result.windows] == ["toy_000002_000000", "toy_000003_000000"]
         assert {window.target_frame for window in result.windows} == {8}
         windows = results.read_windows(out, result.windows_id)
-        assert windows["inputs"].shape == (2, len(row.sensors), 2, 128, 128)
+        assert windows["inputs"].shape == (2, len(row.facts.sensors), 2, 128, 128)
         predictions = results.read_predictions(folder)
         counts = results.read_counts(folder)
         for n in range(2):

@@ -81,6 +81,7 @@ def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group]) -
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
     axes.set_xlim(0, _ROOM * max(_highest(scores, category), 1e-3))
+    axes.set_xticks([tick for tick in axes.get_xticks() if tick <= 1])
 
 
 def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str) -> None:
