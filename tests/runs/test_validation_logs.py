@@ -21,7 +21,7 @@ def test_recordings_of_another_frame_rate_are_scored_in_windows_of_their_own(log
     rows = [{"name": "ED-DC", "model": "ed", "validation_window": {"step_frames": 2, "target_frame": None}}]
     record = run(rows, logs, tmp_path / "run")
     assert record.rows[0].failure is None
-    assert record.rows[0].step_frames == 2
+    assert record.rows[0].facts.step_frames == 2
     result = results.read_result(results.result_folder(tmp_path / "run", record.rows[0].results[0]))
     assert [window.target_frame for window in result.windows] == [4, 5, 6, 7, 8] * 2
 
