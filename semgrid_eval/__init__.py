@@ -11,25 +11,25 @@ if TYPE_CHECKING:
     from semgrid_eval.api import (
         build_grids,
         convert,
+        find_logs,
         fit,
+        load_run,
         make_model,
         make_windows,
         open_log,
         plot_grid,
         run,
         score,
+        write_report,
     )
     from semgrid_eval.classes import CLASS_NAMES, CLASSES
     from semgrid_eval.config import Config
     from semgrid_eval.errors import SemgridError
     from semgrid_eval.grids.recording import GridRecording
     from semgrid_eval.grids.spec import GridConfig, GridSpec
-    from semgrid_eval.log.store import find_logs
     from semgrid_eval.models.model import Baseline, Given, Model, one_hot
     from semgrid_eval.models.network import Network, NetworkSettings, input_planes
-    from semgrid_eval.report.page.write import write_report
     from semgrid_eval.scores.evaluate import Evaluation, evaluate
-    from semgrid_eval.scores.tidy import load_figures as load_run
     from semgrid_eval.scores.tidy import tidy
     from semgrid_eval.windows.data import WindowBatch, WindowSet
     from semgrid_eval.windows.plan import WindowConfig
@@ -75,7 +75,10 @@ __all__ = [
     "write_report",
 ]
 
-_API = ("build_grids", "convert", "fit", "make_model", "make_windows", "open_log", "plot_grid", "run", "score")
+_API = (
+    *("build_grids", "convert", "find_logs", "fit", "load_run", "make_model", "make_windows"),
+    *("open_log", "plot_grid", "run", "score", "write_report"),
+)
 _PLACES = {
     **dict.fromkeys(_API, "api"),
     **dict.fromkeys(("CLASSES", "CLASS_NAMES"), "classes"),
@@ -83,24 +86,20 @@ _PLACES = {
     "SemgridError": "errors",
     "GridRecording": "grids.recording",
     **dict.fromkeys(("GridConfig", "GridSpec"), "grids.spec"),
-    "find_logs": "log.store",
     **dict.fromkeys(("Baseline", "Given", "Model", "one_hot"), "models.model"),
     **dict.fromkeys(("Network", "NetworkSettings", "input_planes"), "models.network"),
-    "write_report": "report.page.write",
     **dict.fromkeys(("Evaluation", "evaluate"), "scores.evaluate"),
-    **dict.fromkeys(("load_figures", "tidy"), "scores.tidy"),
+    "tidy": "scores.tidy",
     **dict.fromkeys(("WindowBatch", "WindowSet"), "windows.data"),
     "WindowConfig": "windows.plan",
 }
-_CALLED = {"load_run": "load_figures"}
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever is asked for
     """Import what is asked for: torch and matplotlib only where they are needed."""
-    called = _CALLED.get(name, name)
-    if name not in __all__ or called not in _PLACES:
+    if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = getattr(import_module(f"{__name__}.{_PLACES[called]}"), called)
+    found = getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
     globals()[name] = found
     return found
 

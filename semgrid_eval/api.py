@@ -15,6 +15,7 @@ from semgrid_eval.executors import local_executor
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.recording import GridRecording
 from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.log import store
 from semgrid_eval.log.convert import ConversionSummary, Work
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.models.device import choose_device
@@ -29,6 +30,7 @@ from semgrid_eval.scores.metrics.iou import confusion
 from semgrid_eval.scores.metrics.metric import column_names
 from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.scores.results import RunRecord
+from semgrid_eval.scores.tidy import load_figures
 from semgrid_eval.sources.known import SOURCES, load_source
 from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import stack_recordings
@@ -36,6 +38,7 @@ from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from pandas import DataFrame
 
 
 def convert(source: str, out: Path | str, *, workers: int = 1, **options: Any) -> ConversionSummary:  # noqa: ANN401
@@ -66,6 +69,15 @@ def open_log(path: Path | str) -> LogReader:
         LogError: the file cannot be read, is damaged, or is not a log of this package.
     """
     return LogReader(Path(path))
+
+
+def find_logs(folder: Path | str) -> list[Path]:
+    """List all logs below a folder, sorted by path.
+
+    Raises:
+        InputError: the folder does not exist or holds no log.
+    """
+    return store.find_logs(Path(folder))
 
 
 def build_grids(log: Path | str, config: GridConfig | None = None) -> list[GridRecording]:
@@ -227,3 +239,35 @@ def run(
     executor = local_executor(jobs)
     options = RunOptions(device, folder / "grids", "semgrid_eval.run", tuple(only), executor, executor)
     return run_matrix(load_matrix(str(matrix)), Path(logs), folder, options)
+
+
+def load_run(
+    run: Path | str, *, metrics: Sequence[str] | None = None, partitions: Sequence[str] | None = None
+) -> "DataFrame":
+    """Return every figure of a run: row, seed, metric, division, region, column, value, cells, windows.
+
+    Args:
+        run: its folder.
+        metrics: names of metrics, all by default.
+        partitions: names of partitions into regions, all by default.
+
+    Raises:
+        InputError: the run or a result of it cannot be read.
+    """
+    return load_figures(Path(run), metrics=metrics, partitions=partitions)
+
+
+def write_report(run: Path | str | Sequence[Path | str], out: Path | str | None = None) -> Path:
+    """Write the report of one run, or of several side by side, and return its page.
+
+    Args:
+        run: the folder of a run, or several.
+        out: the folder to write; `report` in the (first) run if not given. A report there is replaced.
+
+    Raises:
+        InputError: a run's record cannot be read, or `out` holds something other than a report.
+    """
+    from semgrid_eval.report.page import write  # so that matplotlib is imported only for reports
+
+    folders = [Path(run)] if isinstance(run, Path | str) else [Path(each) for each in run]
+    return write.write_report(folders, None if out is None else Path(out))

@@ -9,9 +9,11 @@ import pytest
 import torch
 import yaml
 from support.models import made, network
+from support.toy_world import street
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.cli.main import cli
+from semgrid_eval.log.store import write_log
 from semgrid_eval.models.registry import find_model
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.windows.data import WindowBatch
@@ -58,7 +60,7 @@ def test_matrices_of_the_readme_load(workplace):
         if "rows:" in block:
             Path("m.yaml").write_text(block)
             loaded += len(load_matrix("m.yaml").rows)
-    assert loaded == 11
+    assert loaded == 12
 
 
 def own_batch():
@@ -84,7 +86,20 @@ def test_model_of_the_readme_loads_its_weights_and_gives_probabilities(tmp_path)
     torch.testing.assert_close(answer.sum(dim=1), torch.ones(2, 16, 16))
 
 
-@pytest.mark.parametrize("page", ["README.md", "ARCHITECTURE.md", "docs/town.md", "reports/README.md"])
+def test_python_of_the_readme_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_log(street(1, frames=26, noise_px=0.05).recording(), tmp_path / "logs" / "val" / "toy.mcap")
+    shown = {}
+    exec(blocks("python")[2], shown)
+    assert shown["iou"]["road"] > 0.5
+    assert set(shown["table"].row) >= {"BL-DC", "BL-Fuse"}
+    assert Path("prediction.png").stat().st_size > 1000
+    assert Path("runs/python/report/index.html").is_file()
+
+
+@pytest.mark.parametrize(
+    "page", ["README.md", "ARCHITECTURE.md", "docs/readings.md", "docs/town.md", "reports/README.md"]
+)
 def test_links_and_files_that_a_page_names_exist(page):
     text = (ROOT / page).read_text(encoding="utf-8")
     links = [target for target in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in target]
