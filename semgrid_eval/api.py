@@ -18,7 +18,7 @@ from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.log import store
 from semgrid_eval.log.convert import ConversionSummary, Work
 from semgrid_eval.log.reader import LogReader
-from semgrid_eval.models.device import choose_device
+from semgrid_eval.models.device import choose_device, settle_process
 from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.network import Network, seeded_network
 from semgrid_eval.models.registry import find_model
@@ -205,6 +205,7 @@ def fit(
         if model.learns():
             model.fit(windows)
         return model
+    settle_process()
     with TemporaryDirectory() as temporary:
         place = Path(folder or temporary)
         return train(

@@ -19,8 +19,11 @@ rows:
 MODEL = """
 import torch
 
-class Unknown:
-    def __call__(self, batch):
+from semgrid_eval import Model
+
+
+class Unknown(Model):
+    def predict(self, batch):
         return torch.eye(10)[torch.zeros(batch.target.shape, dtype=torch.long)].permute(0, 3, 1, 2)
 """
 
@@ -59,7 +62,10 @@ def test_convert_grids_and_run_do_on_ray_what_they_do_here(here):
         log.read_bytes() for log in find_logs(here / "ray")
     ]
     rows, again = (read_run(here / where / "run").rows for where in ("here", "ray"))
-    assert [(row.name, row.model, row.failure) for row in rows] == [("BL-DC", "BL", None), ("Unknown", "Unknown", None)]
+    assert [(row.name, row.facts.family, row.failure) for row in rows] == [
+        ("BL-DC", "BL", None),
+        ("Unknown", "Unknown", None),
+    ]
     assert rows == again
     for row in rows:
         counts = [
