@@ -1,10 +1,13 @@
 """The floors of the house: a module imports from lower floors only, and some packages live on one floor alone."""
 
 import ast
+import re
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import semgrid_eval
+from semgrid_eval.models.registry import MODELS
 
 ROOT = Path(semgrid_eval.__file__).parent
 FLOORS = [
@@ -100,3 +103,31 @@ def test_names_of_rows_mean_something_to_the_papers_claims_alone():
         if "claims" not in path.parts and word in path.read_text()
     ]
     assert told == []
+
+
+def test_runs_reports_and_commands_name_no_model():
+    named = re.compile("|".join(rf"[\"']{name}[\"']" for name in MODELS))
+    strays = [
+        path for floor, path in modules() if floor in ("runs", "report", "cli") and named.search(path.read_text())
+    ]
+    assert strays == []
+
+
+def test_no_module_is_long_and_no_two_import_each_other():
+    paths = {name_of(path): path for _, path in modules()}
+    assert {name for name, path in paths.items() if path.read_text().count("\n") > 300} == set()
+    needs = {name: set(needed_at_once(path)) & paths.keys() for name, path in paths.items()}
+    ordered = TopologicalSorter(needs).static_order()  # raises CycleError
+    assert len(list(ordered)) == len(paths)
+
+
+def name_of(path: Path) -> str:
+    return ".".join(("semgrid_eval", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
+
+
+def needed_at_once(path: Path) -> Iterator[str]:
+    """What a module imports when it is imported, each name as a module and as a member of one."""
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            yield str(node.module)
