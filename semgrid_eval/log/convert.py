@@ -17,19 +17,12 @@ _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 @dataclass(frozen=True)
 class Work:
-    """How a conversion is carried out; none of it changes what is written.
+    """How a conversion is carried out; none of it changes what is written."""
 
-    Args:
-        workers: processes of this machine at once.
-        executor: where recordings are converted; by default in those processes.
-        cache: folder of what a source keeps beside the logs; by default in the folder of the logs.
-        stage: shows progress.
-    """
-
-    workers: int = 1
-    executor: Executor | None = None
-    cache: Path | None = None
-    stage: Stage = silent_stage
+    workers: int = 1  # processes of this machine at once
+    executor: Executor | None = None  # where recordings are converted; by default in those processes
+    cache: Path | None = None  # folder of what a source keeps beside the logs; by default in the folder of the logs
+    stage: Stage = silent_stage  # shows progress
 
 
 IN_PROCESS = Work()
@@ -40,16 +33,13 @@ class ConversionJob:
     """One recording to convert; it travels to another process, so `digest` and `load` must be picklable.
 
     Args:
-        name: of the recording, a valid file name without suffix.
-        split: the folder its log goes to.
         digest: digest of everything that determines the content, or what computes it (in the other process).
-        load: returns the recording.
     """
 
-    name: str
-    split: str
+    name: str  # of the recording, a valid file name without suffix
+    split: str  # the folder its log goes to
     digest: str | Callable[[], str]
-    load: Callable[[], Recording]
+    load: Callable[[], Recording]  # returns the recording
 
     @property
     def label(self) -> str:
@@ -62,18 +52,14 @@ class ConversionSummary:
     """What became of each recording, by split and name (`val/aachen_000000_000000`), sorted.
 
     Args:
-        written: new logs.
-        skipped: logs that are up to date.
-        failed: reasons.
         all_splits: whether these are all recordings of all splits, so that no other log belongs beside theirs.
-        remark: what else the source has to say, one line.
     """
 
-    written: list[str] = field(default_factory=list)
-    skipped: list[str] = field(default_factory=list)
-    failed: dict[str, str] = field(default_factory=dict)
+    written: list[str] = field(default_factory=list)  # new logs
+    skipped: list[str] = field(default_factory=list)  # logs that are up to date
+    failed: dict[str, str] = field(default_factory=dict)  # reasons
     all_splits: bool = False
-    remark: str = ""
+    remark: str = ""  # what else the source has to say, one line
 
     @property
     def labels(self) -> set[str]:

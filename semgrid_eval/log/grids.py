@@ -32,17 +32,11 @@ class GridPlace:
 
 @dataclass(frozen=True, eq=False)
 class GridLayer:
-    """What the values of a grid mean.
+    """What the values of a grid mean."""
 
-    Args:
-        field: name of the values.
-        rgba: (256, 4) sRGB and opacity by value.
-        names: by value.
-    """
-
-    field: str
-    rgba: Values
-    names: tuple[str, ...] = ()
+    field: str  # name of the values
+    rgba: Values  # (256, 4) sRGB and opacity by value
+    names: tuple[str, ...] = ()  # by value
 
 
 def _class_colours() -> Values:

@@ -44,25 +44,15 @@ class SequenceFrame:
 
 @dataclass(frozen=True)
 class CityscapesSequence:
-    """One recording of a Cityscapes tree, found but not read yet.
+    """One recording of a Cityscapes tree, found but not read yet."""
 
-    Args:
-        name: that of its first frame.
-        split: the folder that it is in.
-        city: the folder in that of the split.
-        camera_name: what its camera shall be called in the log.
-        frames: in the order of their numbers.
-        lost: where the image of the first lost frame should be; None where the numbers have no gap.
-        train_ids: whether label images hold train ids instead of label ids.
-    """
-
-    name: str
-    split: str
-    city: str
-    camera_name: str
-    frames: tuple[SequenceFrame, ...]
-    lost: Path | None
-    train_ids: bool
+    name: str  # that of its first frame
+    split: str  # the folder that it is in
+    city: str  # the folder in that of the split
+    camera_name: str  # what its camera shall be called in the log
+    frames: tuple[SequenceFrame, ...]  # in the order of their numbers
+    lost: Path | None  # where the image of the first lost frame should be; None where the numbers have no gap
+    train_ids: bool  # whether label images hold train ids instead of label ids
 
     def digest(self) -> str:
         """Digest the bytes of all files and the options; computed once.

@@ -62,17 +62,11 @@ SURFACE_COLOURS = np.array([_COLOURS[surface] for surface in Surface], np.uint8)
 
 @dataclass(frozen=True)
 class Ground:
-    """Surfaces (H, W) of cells of `CELL_M`; row 0 is southernmost, column 0 westernmost, beyond them is terrain.
+    """Surfaces (H, W) of cells of `CELL_M`; row 0 is southernmost, column 0 westernmost, beyond them is terrain."""
 
-    Args:
-        surface: values of `Surface`.
-        west_m: x of the western edge in the map frame.
-        south_m: y of the southern edge in the map frame.
-    """
-
-    surface: NDArray[np.uint8]
-    west_m: float
-    south_m: float
+    surface: NDArray[np.uint8]  # values of `Surface`
+    west_m: float  # x of the western edge in the map frame
+    south_m: float  # y of the southern edge in the map frame
 
     def at(self, x_m: NDArray[np.floating], y_m: NDArray[np.floating]) -> NDArray[np.uint8]:
         """Return the surfaces at points of any shape in the map frame."""

@@ -14,21 +14,13 @@ _MAX_STEP_M = 1.2  # 20 m/s at 17 Hz; what goes farther was moved by SUMO, not d
 
 @dataclass(frozen=True)
 class Trajectory:
-    """The rear axle's path on the clock of the simulation.
+    """The rear axle's path on the clock of the simulation."""
 
-    Args:
-        times_s: (S,).
-        position_m: (S, 2) in the map frame.
-        yaw_rad: (S,) continuous.
-        speed_mps: (S,) along the heading.
-        yaw_rate_radps: (S,) left-positive.
-    """
-
-    times_s: NDArray[np.float64]
-    position_m: NDArray[np.float64]
-    yaw_rad: NDArray[np.float64]
-    speed_mps: NDArray[np.float64]
-    yaw_rate_radps: NDArray[np.float64]
+    times_s: NDArray[np.float64]  # (S,)
+    position_m: NDArray[np.float64]  # (S, 2) in the map frame
+    yaw_rad: NDArray[np.float64]  # (S,) continuous
+    speed_mps: NDArray[np.float64]  # (S,) along the heading
+    yaw_rate_radps: NDArray[np.float64]  # (S,) left-positive
 
     def at(self, time_s: float) -> tuple[float, float, float, float, float]:
         """Interpolate x, y, yaw, speed and yaw rate."""
@@ -41,21 +33,13 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class MotionNoise:
-    """Errors of the reported motion: constant for a recording, white for a sample, and how old a value is.
+    """Errors of the reported motion: constant for a recording, white for a sample, and how old a value is."""
 
-    Args:
-        speed_scale: standard deviation of the wheel circumference's relative error.
-        speed_mps: standard deviation of each reported speed.
-        yaw_rate_bias_radps: standard deviation of the gyroscope's offset.
-        yaw_rate_radps: standard deviation of each reported yaw rate.
-        latency_s: by which reports lag behind.
-    """
-
-    speed_scale: float = 0.004
-    speed_mps: float = 0.02
-    yaw_rate_bias_radps: float = 0.0008
-    yaw_rate_radps: float = 0.0025
-    latency_s: float = 0.02
+    speed_scale: float = 0.004  # standard deviation of the wheel circumference's relative error
+    speed_mps: float = 0.02  # standard deviation of each reported speed
+    yaw_rate_bias_radps: float = 0.0008  # standard deviation of the gyroscope's offset
+    yaw_rate_radps: float = 0.0025  # standard deviation of each reported yaw rate
+    latency_s: float = 0.02  # by which reports lag behind
 
 
 EXACT_MOTION = MotionNoise(0.0, 0.0, 0.0, 0.0, 0.0)

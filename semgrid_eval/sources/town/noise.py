@@ -38,62 +38,35 @@ _MISTAKES = {
 
 @dataclass(frozen=True)
 class DisparityNoise:
-    """Errors of disparity; standard deviations are in pixels of a 2048 pixel wide image.
+    """Errors of disparity; standard deviations are in pixels of a 2048 pixel wide image."""
 
-    Args:
-        correlated_px: smooth over `correlation` of the image's width, new in each frame.
-        slow_px: likewise smooth, but carried from frame to frame with `persistence`.
-        white_px: of each pixel for itself.
-        correlation: standard deviation of the smoothing kernel as a share of the width.
-        persistence: share of the slow error, and of where mismatches are, that the next frame keeps.
-        mismatched: share of the image in patches that were matched to something else.
-        mismatch_px: standard deviation of the error there.
-        dropout: share of patches without disparity near the camera, and ...
-        far_dropout: ... at an infinite distance, where a matching window holds more borders.
-        dropout_persistence: share of where dropouts are that the next frame keeps.
-        speckle: share of single pixels without disparity.
-        fattened: share of the borders at which the foreground spreads over the background.
-        sky: share of the sky that has a wrong, small disparity.
-    """
-
-    correlated_px: float = 0.28
-    slow_px: float = 0.26
-    white_px: float = 0.25
-    correlation: float = 0.012
-    persistence: float = 0.9
-    mismatched: float = 0.010
-    mismatch_px: float = 6.0
-    dropout: float = 0.04
-    far_dropout: float = 0.18
-    dropout_persistence: float = 0.7
-    speckle: float = 0.015
-    fattened: float = 0.6
-    sky: float = 0.45
+    correlated_px: float = 0.28  # smooth over `correlation` of the image's width, new in each frame
+    slow_px: float = 0.26  # likewise smooth, but carried from frame to frame with `persistence`
+    white_px: float = 0.25  # of each pixel for itself
+    correlation: float = 0.012  # standard deviation of the smoothing kernel as a share of the width
+    persistence: float = 0.9  # share of the slow error, and of where mismatches are, that the next frame keeps
+    mismatched: float = 0.010  # share of the image in patches that were matched to something else
+    mismatch_px: float = 6.0  # standard deviation of the error there
+    dropout: float = 0.04  # share of patches without disparity near the camera, and ...
+    far_dropout: float = 0.18  # ... at an infinite distance, where a matching window holds more borders
+    dropout_persistence: float = 0.7  # share of where dropouts are that the next frame keeps
+    speckle: float = 0.015  # share of single pixels without disparity
+    fattened: float = 0.6  # share of the borders at which the foreground spreads over the background
+    sky: float = 0.45  # share of the sky that has a wrong, small disparity
 
 
 @dataclass(frozen=True)
 class LabelNoise:
-    """Errors of labels; lengths are in pixels of a 512 pixel wide image.
+    """Errors of labels; lengths are in pixels of a 512 pixel wide image."""
 
-    Args:
-        warp_px: standard deviation of the borders' displacement.
-        border_px: how far from the true place a border may be in a bad patch.
-        bad_borders: share of the image in such patches.
-        confused_px: how far the labels of a patch of confusion may be from their true place.
-        confused: share of the image in such patches.
-        mistaken: factor on the shares of `_MISTAKES`, patches that get another label as a whole.
-        persistence: share of the borders' error fields that the next frame keeps; the rest flickers.
-        mistakes_persistence: likewise, of the patches with another label.
-    """
-
-    warp_px: float = 0.35
-    border_px: float = 2.0
-    bad_borders: float = 0.10
-    confused_px: float = 8.0
-    confused: float = 0.004
-    mistaken: float = 0.5
-    persistence: float = 0.7
-    mistakes_persistence: float = 0.9
+    warp_px: float = 0.35  # standard deviation of the borders' displacement
+    border_px: float = 2.0  # how far from the true place a border may be in a bad patch
+    bad_borders: float = 0.10  # share of the image in such patches
+    confused_px: float = 8.0  # how far the labels of a patch of confusion may be from their true place
+    confused: float = 0.004  # share of the image in such patches
+    mistaken: float = 0.5  # factor on the shares of `_MISTAKES`, patches that get another label as a whole
+    persistence: float = 0.7  # share of the borders' error fields that the next frame keeps; the rest flickers
+    mistakes_persistence: float = 0.9  # likewise, of the patches with another label
 
 
 class DisparityErrors:

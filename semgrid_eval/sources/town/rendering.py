@@ -31,31 +31,18 @@ STAMP_JITTER_S = 0.001
 
 @dataclass(frozen=True)
 class RecordingPlan:
-    """Everything that determines a recording; small, and cheap to send to another process.
+    """Everything that determines a recording; small, and cheap to send to another process."""
 
-    Args:
-        name: of the recording.
-        split: `train` or `val`.
-        town: folder of the town.
-        town_digest: of the town's specification.
-        drive: which car, from when.
-        seed: of the recording's random numbers.
-        width_px: of the images.
-        height_px: of the images.
-        stereo: `modelled`, `matched`, or `exact` for perfect labels, disparity and motion.
-        dataset: named in the log.
-    """
-
-    name: str
-    split: str
-    town: Path
-    town_digest: str
-    drive: Drive
-    seed: tuple[int, ...]
-    width_px: int
-    height_px: int
-    stereo: str
-    dataset: str = "synthetic"
+    name: str  # of the recording
+    split: str  # `train` or `val`
+    town: Path  # folder of the town
+    town_digest: str  # of the town's specification
+    drive: Drive  # which car, from when
+    seed: tuple[int, ...]  # of the recording's random numbers
+    width_px: int  # of the images
+    height_px: int  # of the images
+    stereo: str  # `modelled`, `matched`, or `exact` for perfect labels, disparity and motion
+    dataset: str = "synthetic"  # named in the log
 
     @property
     def digest(self) -> str:

@@ -42,23 +42,14 @@ def cityscapes_camera(width_px: int, height_px: int) -> CameraCalibration:
 
 @dataclass(frozen=True)
 class View:
-    """What a camera sees, one row a pixel, row by row (N = H * W).
+    """What a camera sees, one row a pixel, row by row (N = H * W)."""
 
-    Args:
-        depth_m: (N,) along the optical axis, infinite for the sky.
-        points_m: (N, 3) what is seen, in the frame of the stage; of the sky, something far away.
-        label: (N,) Cityscapes label id.
-        instance: (N,) actor id, 0 where there is none.
-        surface: (N,) of the ground, where there is ground.
-        triangle: (N,) index of the triangle that is seen, `NO_TRIANGLE` where it is ground or sky.
-    """
-
-    depth_m: NDArray[np.float32]
-    points_m: NDArray[np.float32]
-    label: NDArray[np.uint8]
-    instance: NDArray[np.uint16]
-    surface: NDArray[np.uint8]
-    triangle: NDArray[np.int32]
+    depth_m: NDArray[np.float32]  # (N,) along the optical axis, infinite for the sky
+    points_m: NDArray[np.float32]  # (N, 3) what is seen, in the frame of the stage; of the sky, something far away
+    label: NDArray[np.uint8]  # (N,) Cityscapes label id
+    instance: NDArray[np.uint16]  # (N,) actor id, 0 where there is none
+    surface: NDArray[np.uint8]  # (N,) of the ground, where there is ground
+    triangle: NDArray[np.int32]  # (N,) index of the triangle that is seen, `NO_TRIANGLE` where it is ground or sky
 
 
 @dataclass(frozen=True)

@@ -15,21 +15,13 @@ _IS_PERSON = np.array([user.shape is Shape.PERSON for user in ROAD_USERS])
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Everybody at one moment; all arrays have one row an actor.
+    """Everybody at one moment; all arrays have one row an actor."""
 
-    Args:
-        actor: (A,) index of the actor in its town.
-        type_index: (A,) index into `ROAD_USERS`.
-        centre_m: (A, 2) centre of the footprint in the map frame.
-        yaw_rad: (A,) counter-clockwise from the map's x axis.
-        velocity_mps: (A, 2) in the map frame.
-    """
-
-    actor: NDArray[np.int32]
-    type_index: NDArray[np.uint8]
-    centre_m: NDArray[np.float64]
-    yaw_rad: NDArray[np.float64]
-    velocity_mps: NDArray[np.float64]
+    actor: NDArray[np.int32]  # (A,) index of the actor in its town
+    type_index: NDArray[np.uint8]  # (A,) index into `ROAD_USERS`
+    centre_m: NDArray[np.float64]  # (A, 2) centre of the footprint in the map frame
+    yaw_rad: NDArray[np.float64]  # (A,) counter-clockwise from the map's x axis
+    velocity_mps: NDArray[np.float64]  # (A, 2) in the map frame
 
     def __len__(self) -> int:
         return len(self.actor)
@@ -41,25 +33,15 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Traffic:
-    """SUMO's trajectories, sorted by time; rows `offsets[i]` to `offsets[i + 1]` belong to `times_s[i]`.
+    """SUMO's trajectories, sorted by time; rows `offsets[i]` to `offsets[i + 1]` belong to `times_s[i]`."""
 
-    Args:
-        times_s: (T,) times of the steps.
-        offsets: (T + 1,) first row of each step.
-        actor: (R,) index of the actor.
-        position_m: (R, 2) middle of the front bumper in the map frame (of a person: the person).
-        heading_rad: (R,) counter-clockwise from the map's x axis.
-        speed_mps: (R,) along the heading.
-        actor_types: (A,) index into `ROAD_USERS` of each actor.
-    """
-
-    times_s: NDArray[np.float64]
-    offsets: NDArray[np.int64]
-    actor: NDArray[np.int32]
-    position_m: NDArray[np.float32]
-    heading_rad: NDArray[np.float32]
-    speed_mps: NDArray[np.float32]
-    actor_types: NDArray[np.uint8]
+    times_s: NDArray[np.float64]  # (T,) times of the steps
+    offsets: NDArray[np.int64]  # (T + 1,) first row of each step
+    actor: NDArray[np.int32]  # (R,) index of the actor
+    position_m: NDArray[np.float32]  # (R, 2) middle of the front bumper in the map frame (of a person: the person)
+    heading_rad: NDArray[np.float32]  # (R,) counter-clockwise from the map's x axis
+    speed_mps: NDArray[np.float32]  # (R,) along the heading
+    actor_types: NDArray[np.uint8]  # (A,) index into `ROAD_USERS` of each actor
 
     def save(self, folder: Path) -> None:
         """Write one `.npy` file an array."""
