@@ -32,23 +32,14 @@ class Surface(IntEnum):
     PARKING = 6
 
 
-_LABELS = {
-    Surface.TERRAIN: "terrain",
-    Surface.ROAD: "road",
-    Surface.MARKING: "road",
-    Surface.SIDEWALK: "sidewalk",
-    Surface.CROSSING: "road",
-    Surface.BICYCLE_LANE: "road",
-    Surface.PARKING: "road",
-}
-_COLOURS = {
-    Surface.TERRAIN: (92, 108, 62),
-    Surface.ROAD: (92, 92, 94),
-    Surface.MARKING: (205, 205, 200),
-    Surface.SIDEWALK: (146, 140, 134),
-    Surface.CROSSING: (200, 200, 196),
-    Surface.BICYCLE_LANE: (112, 78, 72),
-    Surface.PARKING: (104, 102, 102),
+_LOOKS = {
+    Surface.TERRAIN: ("terrain", (92, 108, 62)),
+    Surface.ROAD: ("road", (92, 92, 94)),
+    Surface.MARKING: ("road", (205, 205, 200)),
+    Surface.SIDEWALK: ("sidewalk", (146, 140, 134)),
+    Surface.CROSSING: ("road", (200, 200, 196)),
+    Surface.BICYCLE_LANE: ("road", (112, 78, 72)),
+    Surface.PARKING: ("road", (104, 102, 102)),
 }
 _LANE_SURFACES = {  # in the order of drawing
     LaneUse.PARKING: Surface.PARKING,
@@ -56,8 +47,8 @@ _LANE_SURFACES = {  # in the order of drawing
     LaneUse.CAR: Surface.ROAD,
     LaneUse.SIDEWALK: Surface.SIDEWALK,
 }
-SURFACE_LABELS = np.array([LABEL_ID[_LABELS[surface]] for surface in Surface], np.uint8)
-SURFACE_COLOURS = np.array([_COLOURS[surface] for surface in Surface], np.uint8)
+SURFACE_LABELS = np.array([LABEL_ID[_LOOKS[surface][0]] for surface in Surface], np.uint8)
+SURFACE_COLOURS = np.array([_LOOKS[surface][1] for surface in Surface], np.uint8)
 
 
 @dataclass(frozen=True)
