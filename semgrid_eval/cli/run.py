@@ -88,15 +88,7 @@ def command(
     # A cluster that is started here has --jobs cores, and grids are to be built on --workers.
     grids_on = local_executor(workers) if address == LOCAL else chosen_executor(executor, address, workers)
     options = RunOptions(
-        device,
-        grids or out / "grids",
-        command_line(),
-        only,
-        rows_on,
-        grids_on,
-        pictures,
-        validation_logs,
-        trainings,
+        device, grids or out / "grids", command_line(), only, rows_on, grids_on, pictures, validation_logs, trainings
     )
     if dry_run:
         return _show_plan(resolved, logs, out, options)

@@ -1,6 +1,7 @@
 """Convert recordings to logs, several at once: what is done is skipped, what fails is named, the rest goes on."""
 
 import errno
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -30,15 +31,11 @@ IN_PROCESS = Work()
 
 @dataclass(frozen=True)
 class ConversionJob:
-    """One recording to convert; it travels to another process, so `digest` and `load` must be picklable.
-
-    Args:
-        digest: digest of everything that determines the content, or what computes it (in the other process).
-    """
+    """One recording to convert; it travels to another process, so `digest` and `load` must be picklable."""
 
     name: str  # of the recording, a valid file name without suffix
     split: str  # the folder its log goes to
-    digest: str | Callable[[], str]
+    digest: str | Callable[[], str]  # of all that determines the content, or what computes it (in the other process)
     load: Callable[[], Recording]  # returns the recording
 
     @property
@@ -49,16 +46,12 @@ class ConversionJob:
 
 @dataclass
 class ConversionSummary:
-    """What became of each recording, by split and name (`val/aachen_000000_000000`), sorted.
-
-    Args:
-        all_splits: whether these are all recordings of all splits, so that no other log belongs beside theirs.
-    """
+    """What became of each recording, by split and name (`val/aachen_000000_000000`), sorted."""
 
     written: list[str] = field(default_factory=list)  # new logs
     skipped: list[str] = field(default_factory=list)  # logs that are up to date
     failed: dict[str, str] = field(default_factory=dict)  # reasons
-    all_splits: bool = False
+    all_splits: bool = False  # these are all recordings of all splits: no other log belongs beside theirs
     remark: str = ""  # what else the source has to say, one line
 
     @property
@@ -161,8 +154,6 @@ def _is_current(path: Path, digest: str) -> bool:
 
 
 def _refuse_duplicates(jobs: Sequence[ConversionJob]) -> None:
-    seen: set[str] = set()
-    for job in jobs:
-        if job.label in seen:
-            raise InputError("two recordings have this name", field=job.label)
-        seen.add(job.label)
+    for label, count in Counter(job.label for job in jobs).items():
+        if count > 1:
+            raise InputError("two recordings have this name", field=label)

@@ -122,10 +122,7 @@ class RayCaster:
 
 
 def cast_at_all(
-    casters: Sequence[RayCaster],
-    origins_m: NDArray[np.float32],
-    rays: NDArray[np.float32],
-    limit: NDArray[np.float32],
+    casters: Sequence[RayCaster], origins_m: NDArray[np.float32], rays: NDArray[np.float32], limit: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Cast rays at several sets of triangles, numbered one set after the other; see `RayCaster.cast`."""
     reached, triangle, first = limit, np.full(len(rays), NO_TRIANGLE, np.int32), 0
