@@ -35,9 +35,8 @@ class SplitSize(Config):
 class BenchmarkSize(Config):
     """One size of a benchmark.
 
-    Args:
-        fingerprints: the first characters of every recording's, in the order of split and name, with blanks between;
-            null until published.
+    `fingerprints` are the first characters of every recording's, in the order of split and name, with blanks between;
+    null until published.
     """
 
     seed: int  # of all its towns; sizes have different seeds, so that none trains in a town that another validates in

@@ -15,9 +15,7 @@ C = TypeVar("C", bound=Config)
 class Source(Generic[C]):
     """What makes recordings, as the command line offers it.
 
-    Args:
-        options: what can be chosen. Each field is an option, described by its `description`; a path without default is
-            an argument.
+    Each field of `options` is an option, described by its `description`; a path without default is an argument.
     """
 
     options: type[C]

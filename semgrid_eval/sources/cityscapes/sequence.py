@@ -126,10 +126,9 @@ class CityscapesSequence:
         for frame, stamp_ns in zip(self.frames, stamps_ns, strict=True):
             image, size = read_picture(frame.image, 8, gray=False)
             disparity, disparity_size = read_picture(frame.disparity, 16, gray=True)
-            first = first or size
+            first, label = first or size, None
             _require_size(frame.image, size, first)
             _require_size(frame.disparity, disparity_size, first)
-            label = None
             for path in frame.labels:
                 label, label_size = read_label(path, train_ids=self.train_ids)
                 _require_size(path, label_size, first)
@@ -150,7 +149,5 @@ def sibling(image: Path, channel: str, suffix: str) -> Path:
 
 def _require_size(path: Path, header: PngHeader, first: PngHeader) -> None:
     if header[:2] != first[:2]:
-        raise InputError(
-            f"is {header.width} x {header.height}, but the sequence began with {first.width} x {first.height}",
-            path=path,
-        )
+        began = f"{first.width} x {first.height}"
+        raise InputError(f"is {header.width} x {header.height}, but the sequence began with {began}", path=path)

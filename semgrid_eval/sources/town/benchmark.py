@@ -62,17 +62,14 @@ def config_of(benchmark: Benchmark, size: SizeName) -> SyntheticConfig:
     """Return what `plan_recordings` needs for one size of a benchmark."""
     chosen = benchmark.sizes[size]
     recordings = chosen.train.recordings + chosen.val.recordings
+    same = {name: getattr(benchmark, name) for name in ("width", "height", "stereo", "town_size_m", "duration_s")}
     return SyntheticConfig(
         recordings=recordings,
         seed=chosen.seed,
-        width=benchmark.width,
-        height=benchmark.height,
-        stereo=benchmark.stereo,
         towns=chosen.train.towns + chosen.val.towns,
         val_share=chosen.val.recordings / recordings,
         val_towns=chosen.val.towns,
-        town_size_m=benchmark.town_size_m,
-        duration_s=benchmark.duration_s,
+        **same,
     )
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import semgrid_eval
 from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.geometry import Floats
 from semgrid_eval.sources.town.road_users import ROAD_USERS, Shape
 from semgrid_eval.sources.town.solids import BOX, Texture, colours
 from semgrid_eval.sources.town.traffic import Snapshot
@@ -28,7 +29,7 @@ _FIXED_COLOURS = np.array([(0, 0, 0), (0, 0, 0), *colours("222326 2e363e c4987e 
 
 
 @cache
-def _parts() -> dict[Shape, NDArray[np.float64]]:
+def _parts() -> dict[Shape, Floats]:
     """Read the parts (P, 13) of every shape, words as their codes.
 
     Each has x, y of its base's centre; bottom, top; length and width of base and of top, and the top's shift, all as
@@ -43,7 +44,7 @@ def _parts() -> dict[Shape, NDArray[np.float64]]:
     return {shape: np.array(rows) for shape, rows in parts.items()}
 
 
-def heights_m(actor: NDArray[np.int32], type_index: NDArray[np.uint8]) -> NDArray[np.float64]:
+def heights_m(actor: NDArray[np.int32], type_index: NDArray[np.uint8]) -> Floats:
     """Return the heights (A,) of actors: their type's, but people differ."""
     nominal = np.array([user.height_m for user in ROAD_USERS])[type_index]
     is_person = np.array([user.shape is Shape.PERSON for user in ROAD_USERS])[type_index]
@@ -63,7 +64,7 @@ def boxes_of(snapshot: Snapshot, time_s: float) -> NDArray[np.void]:
     return np.concatenate(parts) if parts else np.empty(0, BOX)
 
 
-def _posed(part: NDArray[np.float64], actors: Snapshot, time_s: float) -> NDArray[np.void]:
+def _posed(part: Floats, actors: Snapshot, time_s: float) -> NDArray[np.void]:
     """Pose parts (P, 13) for A actors of one shape: A * P rows."""
     users = [ROAD_USERS[index] for index in actors.type_index]
     length = np.array([user.length_m for user in users])[:, None]
@@ -88,7 +89,7 @@ def _posed(part: NDArray[np.float64], actors: Snapshot, time_s: float) -> NDArra
     return rows.ravel()
 
 
-def _stride_m(actors: Snapshot, time_s: float) -> NDArray[np.float64]:
+def _stride_m(actors: Snapshot, time_s: float) -> Floats:
     """Return how far (A,) the left leg is ahead: nothing for those who stand."""
     speed = np.linalg.norm(actors.velocity_mps, axis=1)
     phase = 2.0 * np.pi * (_STRIDE_HZ * time_s + _drawn(actors.actor, 2))
@@ -103,7 +104,7 @@ def _colours(actors: Snapshot) -> NDArray[np.uint8]:
     return chosen
 
 
-def _drawn(actor: NDArray[np.int32], purpose: int) -> NDArray[np.float64]:
+def _drawn(actor: NDArray[np.int32], purpose: int) -> Floats:
     """Return a number in 0..1 for each actor (A,) that is always the same for it: a multiplicative hash."""
     mixed = (actor.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(purpose * 0x85EBCA6B)
     mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)

@@ -13,6 +13,12 @@ from semgrid_eval.sources.town.sumo import run_tool
 FILL_S = 24.0
 """Time in which the streets are filled; from then on as many depart as arrive."""
 TYPES_FILE = "types.add.xml"
+_FAR = ("--min-distance", "200")
+_STREAMS = (
+    ("passenger", ("passenger", "truck", "bus"), 75.0, _FAR),
+    ("bicycle", ("bicycle",), 90.0, _FAR),
+    ("pedestrian", ("pedestrian",), 170.0, ("--persons",)),
+)
 
 
 @dataclass(frozen=True)
@@ -46,11 +52,9 @@ def _streams(kind: TownKind) -> list[_Stream]:
     densities = {"passenger": kind.cars, "truck": kind.trucks, "bus": kind.buses}
     densities |= {"bicycle": kind.bicycles, "pedestrian": kind.persons}
     users = {user: densities[user.sumo_class] * user.share for user in ROAD_USERS}
-    motor = {user: count for user, count in users.items() if user.sumo_class in ("passenger", "truck", "bus")}
-    far = ("--min-distance", "200")
-    streams = [_Stream("passenger", motor, 75.0, far)]
-    for permission, trip_s, options in (("bicycle", 90.0, far), ("pedestrian", 170.0, ("--persons",))):
-        chosen = {user: count for user, count in users.items() if user.sumo_class == permission}
+    streams = []
+    for permission, classes, trip_s, options in _STREAMS:
+        chosen = {user: count for user, count in users.items() if user.sumo_class in classes}
         streams.append(_Stream(permission, chosen, trip_s, options))
     return streams
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.geometry import Floats
 from semgrid_eval.sources.town.network import Lane, LaneUse, Network
 from semgrid_eval.sources.town.polyline import Polyline
 
@@ -91,11 +92,11 @@ class GroundPainter:
         height = int((north_m + MARGIN_M - self._south_m) / CELL_M)
         self._surface = np.full((height, width), Surface.TERRAIN, np.uint8)
 
-    def polygon(self, points_m: NDArray[np.float64], surface: Surface) -> None:
+    def polygon(self, points_m: Floats, surface: Surface) -> None:
         """Fill a polygon (N, 2)."""
         cv2.fillPoly(self._surface, [self._fixed_point(points_m)], int(surface), cv2.LINE_8, _SHIFT_BITS)
 
-    def line(self, points_m: NDArray[np.float64], width_m: float, surface: Surface) -> None:
+    def line(self, points_m: Floats, width_m: float, surface: Surface) -> None:
         """Draw a line (N, 2) of some width; like all shapes it covers every cell that it touches."""
         for start, end in pairwise(points_m):
             length = np.linalg.norm(end - start)
@@ -108,7 +109,7 @@ class GroundPainter:
         """Return the ground as drawn so far."""
         return Ground(self._surface, self._west_m, self._south_m)
 
-    def _fixed_point(self, points_m: NDArray[np.float64]) -> NDArray[np.int32]:
+    def _fixed_point(self, points_m: Floats) -> NDArray[np.int32]:
         """Return points in cells, where whole numbers are cell centres, as OpenCV's fixed-point numbers."""
         cells = (points_m - (self._west_m, self._south_m)) / CELL_M - 0.5
         return np.round(cells * (1 << _SHIFT_BITS)).astype(np.int32)
@@ -141,7 +142,7 @@ def _paint_markings(lane: Lane, painter: GroundPainter) -> None:
         painter.line(np.array(ends), 0.3, Surface.MARKING)
 
 
-def _paint_crossing(line_m: NDArray[np.float64], width_m: float, painter: GroundPainter) -> None:
+def _paint_crossing(line_m: Floats, width_m: float, painter: GroundPainter) -> None:
     """Draw the stripes of a crossing over the road that it crosses."""
     line = Polyline.through(line_m)
     for start_m in np.arange(0.3, line.length_m - _STRIPE_M, _STRIPE_PERIOD_M):

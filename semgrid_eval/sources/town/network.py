@@ -6,9 +6,9 @@ from enum import Enum
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.geometry import Floats
 
 _DEFAULT_WIDTH_M = 3.2
 
@@ -28,7 +28,7 @@ class Lane:
 
     use: LaneUse
     edge: str
-    line_m: NDArray[np.float64]
+    line_m: Floats
     width_m: float
     ends_at_light: bool
 
@@ -38,9 +38,9 @@ class Network:
     """The shapes of a town; polygons and lines are (N, 2) in the map frame (x east, y north)."""
 
     lanes: tuple[Lane, ...]
-    junctions_m: tuple[NDArray[np.float64], ...]
-    walking_areas_m: tuple[NDArray[np.float64], ...]
-    crossings: tuple[tuple[NDArray[np.float64], float], ...]  # centre line, width
+    junctions_m: tuple[Floats, ...]
+    walking_areas_m: tuple[Floats, ...]
+    crossings: tuple[tuple[Floats, float], ...]  # centre line, width
 
     def bounds_m(self) -> tuple[float, float, float, float]:
         """Return least x, least y, most x, most y of all lanes and junctions."""
@@ -82,7 +82,7 @@ def read_network(path: Path) -> Network:
     )
 
 
-def _points(element: ET.Element) -> NDArray[np.float64]:
+def _points(element: ET.Element) -> Floats:
     """Return the shape (N, 2); heights, where SUMO writes them, are dropped."""
     return np.array([[float(value) for value in point.split(",")[:2]] for point in element.attrib["shape"].split()])
 

@@ -3,18 +3,19 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from semgrid_eval.geometry import Floats
 
 
 @dataclass(frozen=True)
 class Polyline:
     """A line through points (N, 2); distances along it run from 0 to `length_m`."""
 
-    points_m: NDArray[np.float64]
-    distances_m: NDArray[np.float64]
+    points_m: Floats
+    distances_m: Floats
 
     @classmethod
-    def through(cls, points_m: NDArray[np.float64]) -> "Polyline":
+    def through(cls, points_m: Floats) -> "Polyline":
         """Return the line through points (N, 2); repeated points are left out."""
         steps = np.linalg.norm(np.diff(points_m, axis=0), axis=1)
         keep = np.append(True, steps > 1e-6)
@@ -34,7 +35,7 @@ class Polyline:
         x_m, y_m = start + (distance_m - self.distances_m[segment]) * ahead + left_m * np.array([-ahead[1], ahead[0]])
         return float(x_m), float(y_m), float(np.arctan2(ahead[1], ahead[0]))
 
-    def piece(self, start_m: float, end_m: float, left_m: float = 0.0) -> NDArray[np.float64]:
+    def piece(self, start_m: float, end_m: float, left_m: float = 0.0) -> Floats:
         """Return the points (M, 2) of the line between two distances, moved to its left."""
         inside = self.distances_m[(self.distances_m > start_m) & (self.distances_m < end_m)]
         return np.array([self.at(float(s), left_m)[:2] for s in (start_m, *inside, end_m)])

@@ -15,10 +15,8 @@ from semgrid_eval.progress import Progress
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town.drives import choose_drives
 from semgrid_eval.sources.town.kinds import KINDS
-from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
+from semgrid_eval.sources.town.rendering import RecordingPlan
 from semgrid_eval.sources.town.town import TownSpec, load_town, prepare_town
-
-__all__ = ["RecordingPlan", "SyntheticConfig", "plan_recordings", "render_recording"]
 
 _STEREO = (
     "Errors of labels, disparity and motion: drawn from a model; or disparity from matching a rendered stereo pair; "
@@ -76,7 +74,7 @@ def plan_recordings(
         config: of the data set.
         cache_dir: where towns are kept.
         progress: called for each finished town.
-        workers: towns simulated at the same time; the plans do not depend on it.
+        workers: towns simulated at the same time.
         dataset: the name that the logs carry.
 
     Raises:

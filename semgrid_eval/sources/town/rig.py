@@ -21,10 +21,7 @@ _GREY_PNG = [*_PNG, cv2.IMWRITE_PNG_STRATEGY_RLE, _FILTER, _FILTER_UP]
 class Rig:
     """One or two cameras and their errors, which depend on those of the frames before.
 
-    Args:
-        camera: whose frames the recording holds.
-        stereo: `modelled` or `matched` disparity, or `exact`: neither disparity nor labels have errors.
-        rng: draws the errors.
+    Disparity is `modelled` or `matched`; where stereo is `exact`, neither disparity nor labels have errors.
     """
 
     def __init__(self, camera: Camera, stereo: str, rng: np.random.Generator) -> None:

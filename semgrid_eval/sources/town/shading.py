@@ -95,10 +95,7 @@ class Painter:
     def paint(self, view: View, casters: Sequence[RayCaster], movers: Soup) -> NDArray[np.uint8]:
         """Return the colour image (H, W, 3) in OpenCV's order (blue, green, red).
 
-        Args:
-            view: what is seen; its triangles are those that stand still, then those that move.
-            casters: hold the triangles that throw shadows.
-            movers: triangles that move, in the frame of the stage.
+        Triangles of the view are those that stand still, then the movers'; those of the casters throw shadows.
         """
         sun = self._sunlight
         materials = _Materials.joined([self._still, _Materials.of_soup(movers, sun.direction), self._ground])

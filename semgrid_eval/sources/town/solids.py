@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.geometry import Floats
+
 
 class Texture(IntEnum):
     """How a surface is shaded."""
@@ -117,20 +119,11 @@ def soup_of_boxes(boxes: NDArray[np.void]) -> Soup:
 
 
 def soup_of_crowns(
-    centres_m: NDArray[np.float64],
-    radii_m: NDArray[np.float64],
-    label: int,
-    colours: NDArray[np.uint8],
-    rng: np.random.Generator,
+    centres_m: Floats, radii_m: Floats, label: int, colours: NDArray[np.uint8], rng: np.random.Generator
 ) -> Soup:
     """Turn N crowns into 80 N triangles: ellipsoids with a bumpy surface.
 
-    Args:
-        centres_m: (N, 3).
-        radii_m: (N, 2) horizontal and vertical.
-        label: Cityscapes label id.
-        colours: (N, 3) sRGB.
-        rng: draws the bumps.
+    Their centres (N, 3), radii (N, 2), horizontal and vertical, and sRGB colours (N, 3) differ.
     """
     directions, faces = _icosphere()
     bumps = 1.0 + rng.uniform(-0.28, 0.12, (len(centres_m), len(directions), 1))
@@ -146,7 +139,7 @@ def soup_of_crowns(
     )
 
 
-def _icosphere() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _icosphere() -> tuple[Floats, NDArray[np.int64]]:
     """Return the directions (42, 3) and faces (80, 3) of an icosahedron whose faces are split once."""
     golden = (1.0 + 5.0**0.5) / 2.0
     corners = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
@@ -170,6 +163,6 @@ def _icosphere() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return directions / np.linalg.norm(directions, axis=1, keepdims=True), np.array(split)
 
 
-def _is_outward(points: NDArray[np.float64], face: tuple[int, int, int]) -> bool:
+def _is_outward(points: Floats, face: tuple[int, int, int]) -> bool:
     first, second, third = points[list(face)]
     return bool(np.dot(np.cross(second - first, third - first), first) > 0.0)
