@@ -77,12 +77,6 @@ def convert_jobs(
     A log that is whole and was made from inputs of the same digest is left as it is. A recording that fails, because
     its source is at fault, is named in the summary with its reason.
 
-    Args:
-        jobs: the recordings.
-        out: the folder of all logs.
-        work: how it is done.
-        label: what progress is called.
-
     Raises:
         InputError: two recordings have one name, or the disk is full.
     """

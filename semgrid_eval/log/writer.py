@@ -57,8 +57,8 @@ class MessageWriter:
         """Write one message.
 
         Args:
-            topic: its topic; every message of a topic is of one type.
-            message: the message.
+            topic: all messages of a topic are of one type.
+            message: what it says.
             log_ns: the time it holds for.
             publish_ns: when it could be known, if that is another time.
             notes: metadata of the channel, used at the first message of the topic.

@@ -8,8 +8,7 @@ import numpy as np
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.sources.town.ground import CELL_M, Ground, Surface
 from semgrid_eval.sources.town.kinds import TownKind
-from semgrid_eval.sources.town.network import Lane, LaneUse, Network
-from semgrid_eval.sources.town.polyline import Polyline
+from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline
 from semgrid_eval.sources.town.solids import BoxRow, Look, Texture, box, colours
 from semgrid_eval.sources.town.trees import Tree, draw_bush, draw_tree
 

@@ -4,8 +4,7 @@ import numpy as np
 
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.sources.town.kinds import TownKind
-from semgrid_eval.sources.town.network import Lane, LaneUse, Network
-from semgrid_eval.sources.town.polyline import Polyline
+from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline
 from semgrid_eval.sources.town.road_users import CAR_TYPES, ROAD_USERS
 from semgrid_eval.sources.town.solids import BoxRow, Texture, box
 from semgrid_eval.sources.town.trees import Tree, draw_tree

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
-from semgrid_eval.sources.town.network import Lane, LaneUse, Network
-from semgrid_eval.sources.town.polyline import Polyline
+from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline
 
 CELL_M = 0.2
 MARGIN_M = 120.0

@@ -50,12 +50,8 @@ def drive(times_s: Floats, front_m: Floats, heading_rad: Floats) -> Trajectory |
     """Turn a front bumper's track into the path of the rear axle, or None where the track jumps or breaks off.
 
     The track is smoothed, then the rear axle follows it as a wheel does: it always moves along the vehicle's heading,
-    so that speed and yaw rate integrate to the path.
-
-    Args:
-        times_s: (S,) evenly spaced.
-        front_m: (S, 2) middle of the front bumper, NaN where the vehicle is not there.
-        heading_rad: (S,) heading as SUMO gives it; only the first is used.
+    so that speed and yaw rate integrate to the path. The track is the middle of the front bumper (S, 2) at evenly
+    spaced times, NaN where the vehicle is not there; of SUMO's headings (S,) only the first is used.
     """
     if np.isnan(front_m).any() or np.linalg.norm(np.diff(front_m, axis=0), axis=1).max() > _MAX_STEP_M:
         return None

@@ -49,11 +49,6 @@ class RecordingPlan:
         """Digest of everything that determines the content."""
         return digest_value({"plan": self.description(), "version": RENDER_VERSION})
 
-    @property
-    def group(self) -> str:
-        """Name of the town, `town03`, which its recordings' names begin with."""
-        return self.name.partition("_")[0]
-
     def description(self) -> dict[str, object]:
         """Return the plan as JSON values, without the place of the town on this machine."""
         values = asdict(self)
@@ -74,7 +69,7 @@ def render_recording(plan: RecordingPlan) -> Recording:
         name=plan.name,
         dataset=plan.dataset,
         split=plan.split,
-        group=plan.group,
+        group=plan.name.partition("_")[0],  # the town: town03
         calibrations={CAMERA_NAME: calibration},
         source_digest=plan.digest,
         moments=partial(_moments, plan),
@@ -113,9 +108,8 @@ def _actors(group: Snapshot) -> list[Actor]:
         [group.centre_m, group.yaw_rad, heights_m(group.actor, group.type_index), group.velocity_mps]
     )
     found = []
-    for actor_id, type_index, values in zip(
-        actor_ids(group).tolist(), group.type_index, _rounded(columns), strict=True
-    ):
+    ids = actor_ids(group).tolist()
+    for actor_id, type_index, values in zip(ids, group.type_index, _rounded(columns), strict=True):
         user = ROAD_USERS[type_index]
         x_m, y_m, yaw_rad, height_m, velocity_x, velocity_y = values
         size_m = (user.length_m, user.width_m, height_m)

@@ -139,13 +139,8 @@ def look(
 ) -> View:
     """Cast one ray a pixel.
 
-    Args:
-        camera: on the vehicle.
-        pose: of the vehicle in the map frame.
-        casters: hold the soup's triangles in the frame of the stage.
-        soup: labels and instances of the triangles.
-        ground: in the map frame.
-        stage_m: x, y of the stage's origin in the map frame, near the vehicle, where single precision is exact enough.
+    The soup's triangles, which the casters hold, are in the frame of the stage. Its origin is `stage_m` (x, y) in the
+    map frame, near the vehicle, where single precision is exact enough.
     """
     rays = _turned(camera.rays_ego, pose.yaw_rad)
     offset_m = (pose.x_m - stage_m[0], pose.y_m - stage_m[1], 0.0)
