@@ -65,12 +65,11 @@ class Container:
         self.path = path
         with damage_as_log_error(path):
             self._stream = path.open("rb")
-        try:
-            with damage_as_log_error(path):
+            try:
                 self._load()
-        except BaseException:
-            self._stream.close()
-            raise
+            except BaseException:
+                self._stream.close()
+                raise
 
     def close(self) -> None:
         """Close the file."""

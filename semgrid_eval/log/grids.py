@@ -1,7 +1,6 @@
 """Bird's-eye grids as messages: coloured for viewers, exact for programs."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.Grid_pb2 import Grid
@@ -91,16 +90,3 @@ def exact_message(stamp_ns: int, values: Values, layer: GridLayer, place: GridPl
         class_ids=np.ascontiguousarray(values, np.uint8).tobytes(),
         class_names=layer.names,
     )
-
-
-def read_exact(data: bytes) -> tuple[Values, GridPlace]:
-    """Read the values (H, W) of an exact message, and where the grid is.
-
-    Raises:
-        DecodeError: the message is damaged.
-        ValueError: it holds another number of cells than it states.
-    """
-    message = SemanticGrid.FromString(data)
-    place = GridPlace(message.cell_size_m, message.corner_x_m, message.corner_y_m)
-    values: NDArray[Any] = np.frombuffer(message.class_ids, np.uint8)
-    return values.reshape(message.rows, message.columns), place

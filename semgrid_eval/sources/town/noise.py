@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import LABEL_ID
 
-Floats = NDArray[np.float32]
+Float32s = NDArray[np.float32]
 Labels = NDArray[np.uint8]
 FULL_WIDTH_PX = 2048
 _LABEL_WIDTH_PX = 512
@@ -77,11 +77,11 @@ class DisparityErrors:
     def __init__(self, noise: DisparityNoise, rng: np.random.Generator) -> None:
         self._noise = noise
         self._rng = rng
-        self._slow: Floats | None = None
-        self._mismatch: Floats | None = None
-        self._dropout: Floats | None = None
+        self._slow: Float32s | None = None
+        self._mismatch: Float32s | None = None
+        self._dropout: Float32s | None = None
 
-    def add(self, exact_px: Floats) -> Floats:
+    def add(self, exact_px: Float32s) -> Float32s:
         """Return the next frame's disparity (H, W) with errors, in pixels of its own width."""
         noise, rng, shape = self._noise, self._rng, exact_px.shape
         sigma = noise.correlation * shape[1]
@@ -99,14 +99,14 @@ class DisparityErrors:
         _match_sky(noisy, exact_px, noise.sky, rng)
         return np.maximum(noisy, 0.0)
 
-    def _mismatch_px(self, shape: tuple[int, ...]) -> Floats:
+    def _mismatch_px(self, shape: tuple[int, ...]) -> Float32s:
         """Return the error (H, W) of patches that were matched to something else, 0 around them."""
         noise, sigma = self._noise, 0.008 * shape[1]
         self._mismatch = _carried(self._mismatch, _smooth_field(shape, sigma, self._rng), noise.persistence)
         error_px = np.float32(noise.mismatch_px) * _smooth_field(shape, 2.0 * sigma, self._rng)
         return np.where(self._mismatch > _threshold(noise.mismatched), error_px, np.float32(0.0))
 
-    def _dropout_threshold(self, disparity_px: Floats) -> Floats:
+    def _dropout_threshold(self, disparity_px: Float32s) -> Float32s:
         """Return what a Gaussian field exceeds (H, W) on the share of dropouts at each pixel's range."""
         near, far = _threshold(self._noise.dropout), _threshold(self._noise.far_dropout)
         middle_px = np.float32(_MIDDLE_PX * disparity_px.shape[1] / FULL_WIDTH_PX)
@@ -119,7 +119,7 @@ class LabelErrors:
     def __init__(self, noise: LabelNoise, rng: np.random.Generator) -> None:
         self._noise = noise
         self._rng = rng
-        self._fields: list[Floats | None] = [None] * len(_LABEL_FIELDS_PX)
+        self._fields: list[Float32s | None] = [None] * len(_LABEL_FIELDS_PX)
         self._kept = (*[noise.persistence] * (len(_LABEL_FIELDS_PX) - 1), noise.mistakes_persistence)
         self._mistakes = _mistake_tables(noise.mistaken)
 
@@ -142,7 +142,7 @@ class LabelErrors:
         return np.where(mistake > rare, high[bent], np.where(mistake < -rare, low[bent], bent))
 
 
-def _mistake_tables(factor: float) -> tuple[Floats, Labels, Labels]:
+def _mistake_tables(factor: float) -> tuple[Float32s, Labels, Labels]:
     """Return tables (256,) by label: beyond what value of a field it is mistaken, and for what above and below."""
     limit, high = np.full(256, np.inf, np.float32), np.arange(256, dtype=np.uint8)
     low = high.copy()
@@ -152,14 +152,14 @@ def _mistake_tables(factor: float) -> tuple[Floats, Labels, Labels]:
     return limit, high, low
 
 
-def _carried(old: Floats | None, fresh: Floats, persistence: float) -> Floats:
+def _carried(old: Float32s | None, fresh: Float32s, persistence: float) -> Float32s:
     """Return the next field of an autoregressive sequence whose variance stays what it is."""
     if old is None:
         return fresh
     return np.float32(persistence) * old + np.float32((1.0 - persistence**2) ** 0.5) * fresh
 
 
-def _smooth_field(shape: tuple[int, ...], sigma: float, rng: np.random.Generator) -> Floats:
+def _smooth_field(shape: tuple[int, ...], sigma: float, rng: np.random.Generator) -> Float32s:
     """Return a Gaussian field (H, W) of unit variance, smooth over `sigma` pixels.
 
     It is drawn on a coarser lattice and interpolated, which costs a fraction of blurring at full size.
@@ -179,7 +179,7 @@ def _threshold(share: float) -> float:
     return NormalDist().inv_cdf(1.0 - share) if share > 0.0 else _NEVER
 
 
-def _fattened(disparity_px: Floats, share: float, rng: np.random.Generator) -> Floats:
+def _fattened(disparity_px: Float32s, share: float, rng: np.random.Generator) -> Float32s:
     """Let the foreground spread over its border by half a matching window, in patches."""
     scale = disparity_px.shape[1] / 512
     kernel = np.ones((2 * round(scale) + 1, 4 * round(scale) + 1), np.uint8)
@@ -189,14 +189,14 @@ def _fattened(disparity_px: Floats, share: float, rng: np.random.Generator) -> F
     return np.where(patches & is_border, spread, disparity_px)
 
 
-def _is_occluded(disparity_px: Floats) -> NDArray[np.bool_]:
+def _is_occluded(disparity_px: Float32s) -> NDArray[np.bool_]:
     """Return which points (H, W) of the left image something nearer hides from the right camera."""
     column_right = np.arange(disparity_px.shape[1], dtype=np.float32) - disparity_px
     nearest = np.minimum.accumulate(column_right[:, ::-1], axis=1)[:, ::-1]
     return nearest < column_right - np.float32(0.5)
 
 
-def _match_sky(noisy_px: Floats, exact_px: Floats, share: float, rng: np.random.Generator) -> None:
+def _match_sky(noisy_px: Float32s, exact_px: Float32s, share: float, rng: np.random.Generator) -> None:
     """Set a small disparity in patches of the sky, as matching does where there is nothing to match."""
     shape = exact_px.shape
     patches = (exact_px <= 0.0) & (_smooth_field(shape, 0.01 * shape[1], rng) > _threshold(share))

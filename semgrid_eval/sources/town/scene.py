@@ -32,12 +32,8 @@ class Scene:
         """Write the scene's arrays."""
         self.ground.save(folder)
         self.soup.save(folder)
-        np.savez(
-            folder / "parked.npz",
-            type_index=self.parked.type_index,
-            centre=self.parked.centre_m,
-            yaw=self.parked.yaw_rad,
-        )
+        still = self.parked
+        np.savez(folder / "parked.npz", type_index=still.type_index, centre=still.centre_m, yaw=still.yaw_rad)
 
     @classmethod
     def load(cls, folder: Path) -> "Scene":

@@ -15,7 +15,7 @@ from semgrid_eval.recording.types import CameraCalibration, Pose
 from semgrid_eval.sources.town.ground import SURFACE_LABELS, Ground
 from semgrid_eval.sources.town.solids import Soup
 
-Floats = NDArray[np.float32]
+Float32s = NDArray[np.float32]
 Float = TypeVar("Float", np.float32, np.float64)
 FULL_WIDTH_PX, FULL_HEIGHT_PX = 2048, 1024
 MAX_DEPTH_M = 400.0
@@ -45,8 +45,8 @@ def cityscapes_camera(width_px: int, height_px: int) -> CameraCalibration:
 class View:
     """What a camera sees, one row a pixel, row by row (N = H * W)."""
 
-    depth_m: Floats  # (N,) along the optical axis, infinite for the sky
-    points_m: Floats  # (N, 3) what is seen, in the frame of the stage; of the sky, something far away
+    depth_m: Float32s  # (N,) along the optical axis, infinite for the sky
+    points_m: Float32s  # (N, 3) what is seen, in the frame of the stage; of the sky, something far away
     label: NDArray[np.uint8]  # (N,) Cityscapes label id
     instance: NDArray[np.uint16]  # (N,) actor id, 0 where there is none
     surface: NDArray[np.uint8]  # (N,) of the ground, where there is ground
@@ -62,7 +62,7 @@ class Camera:
     height_px: int
 
     @cached_property
-    def rays_ego(self) -> Floats:
+    def rays_ego(self) -> Float32s:
         """Rays (N, 3) in the vehicle frame; their part along the optical axis is 1, so a ray's length is depth."""
         c = self.calibration
         right = (np.arange(self.width_px) - c.u0_px) / c.fx_px
@@ -76,13 +76,13 @@ class Camera:
         return np.array([self.calibration.x_m, self.calibration.y_m, self.calibration.z_m])
 
     @cached_property
-    def ground_depth_m(self) -> Floats:
+    def ground_depth_m(self) -> Float32s:
         """Depth (N,) at which each ray meets the ground plane, infinite where it does not."""
         fall = -self.rays_ego[:, 2]
         with np.errstate(divide="ignore"):
             return np.where(fall > 0.0, self.origin_ego_m[2] / fall, np.inf).astype(np.float32)
 
-    def disparity_px(self, depth_m: Floats) -> Floats:
+    def disparity_px(self, depth_m: Float32s) -> Float32s:
         """Return the disparity of depths; that of the sky is 0."""
         return (self.calibration.fx_px * self.calibration.baseline_m / depth_m).astype(np.float32)
 
@@ -90,7 +90,7 @@ class Camera:
 class RayCaster:
     """Triangles that rays can be cast at."""
 
-    def __init__(self, triangles_m: Floats) -> None:
+    def __init__(self, triangles_m: Float32s) -> None:
         """Build Embree's tree over triangles (F, 3, 3).
 
         Raises:
@@ -106,7 +106,7 @@ class RayCaster:
         if self.count:
             TriangleMesh(self._scene, np.ascontiguousarray(triangles_m))
 
-    def cast(self, origins_m: Floats, rays: Floats, limit: Floats) -> tuple[Floats, NDArray[np.int32]]:
+    def cast(self, origins_m: Float32s, rays: Float32s, limit: Float32s) -> tuple[Float32s, NDArray[np.int32]]:
         """Return how far each ray from origins (N, 3) gets, in its own lengths, and the triangle that stops it.
 
         Nothing is seen beyond `limit` (N,).
@@ -118,8 +118,8 @@ class RayCaster:
 
 
 def cast_at_all(
-    casters: Sequence[RayCaster], origins_m: Floats, rays: Floats, limit: Floats
-) -> tuple[Floats, NDArray[np.int32]]:
+    casters: Sequence[RayCaster], origins_m: Float32s, rays: Float32s, limit: Float32s
+) -> tuple[Float32s, NDArray[np.int32]]:
     """Cast rays at several sets of triangles, numbered one set after the other; see `RayCaster.cast`."""
     reached, triangle, first = limit, np.full(len(rays), NO_TRIANGLE, np.int32), 0
     for caster in casters:
