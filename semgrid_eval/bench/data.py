@@ -18,7 +18,7 @@ from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town.drives import FRAME_COUNT
 from semgrid_eval.sources.town.kinds import KINDS
-from semgrid_eval.sources.town.recordings import RecordingPlan, render_recording
+from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
 from semgrid_eval.sources.town.town import TownSpec, prepare_town
 
 TOWN_AT_MOST_S = 60.0

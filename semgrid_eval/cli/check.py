@@ -1,7 +1,7 @@
 """`semgrid-eval check`: is a log whole and plausible?"""
 
 import json
-from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -21,7 +21,7 @@ def command(logs: tuple[Path, ...], *, as_json: bool) -> int:
     calibration and motion, and decodes every label and disparity image. One line a finding; the exit code is 1 if any
     is an error.
     """
-    paths = list(_files(logs))
+    paths = [path for given in logs for path in (find_logs(given) if given.is_dir() else [given])]
     reports: list[LogReport] = []
     with progress("check") as watch:
         for path in paths:
@@ -38,19 +38,11 @@ def command(logs: tuple[Path, ...], *, as_json: bool) -> int:
     return 1 if bad else 0
 
 
-def _files(logs: tuple[Path, ...]) -> Iterator[Path]:
-    for path in logs:
-        yield from find_logs(path) if path.is_dir() else [path]
-
-
 def _as_json(report: LogReport) -> dict[str, object]:
     return {
         "log": str(report.path),
         "good": report.good,
         "duration_s": report.duration_s,
         "messages": report.counts,
-        "findings": [
-            {"severity": finding.severity.value, "place": finding.place, "message": finding.message}
-            for finding in report.findings
-        ],
+        "findings": [asdict(finding) for finding in report.findings],
     }

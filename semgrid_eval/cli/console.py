@@ -7,16 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import click
+from rich import progress as rich
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-from rich.progress import Progress as RichProgress
 
 from semgrid_eval.progress import Progress
 
@@ -44,15 +36,11 @@ def progress(label: str) -> Iterator[Progress]:
 
 def _bar(label: str) -> Iterator[Progress]:
     columns = (
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[message]}", markup=False),
+        *(rich.SpinnerColumn(), rich.TextColumn("{task.description}"), rich.BarColumn(), rich.MofNCompleteColumn()),
+        *(rich.TimeElapsedColumn(), rich.TimeRemainingColumn()),
+        rich.TextColumn("{task.fields[message]}", markup=False),
     )
-    with RichProgress(*columns, console=Console(stderr=True)) as bars:
+    with rich.Progress(*columns, console=Console(stderr=True)) as bars:
         task = bars.add_task(label, total=None, message="")
 
         def update(done: int, total: int, message: str = "") -> None:

@@ -13,17 +13,8 @@ import click
 from semgrid_eval import __version__
 from semgrid_eval.errors import SemgridError
 
-_COMMANDS = {
-    "convert": "semgrid_eval.cli.convert",
-    "check": "semgrid_eval.cli.check",
-    "segment": "semgrid_eval.cli.segment",
-    "grids": "semgrid_eval.cli.grids",
-    "run": "semgrid_eval.cli.run",
-    "report": "semgrid_eval.cli.report",
-    "play": "semgrid_eval.cli.play",
-    "demo": "semgrid_eval.cli.demo",
-    "bench": "semgrid_eval.cli.bench",
-}
+_COMMANDS = ("convert", "check", "segment", "grids", "run", "report", "play", "demo", "bench")
+"""Modules of `semgrid_eval.cli`."""
 _GO_ON = ("convert", "segment", "grids", "run", "demo")
 """Commands that keep what is done, so that after a stop they need not begin again."""
 
@@ -37,7 +28,7 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
             return None
-        command = importlib.import_module(_COMMANDS[cmd_name]).command
+        command = importlib.import_module(f"semgrid_eval.cli.{cmd_name}").command
         assert isinstance(command, click.Command)
         return command
 

@@ -16,25 +16,20 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.runs.options import RunOptions
     from semgrid_eval.scores.results import RunRecord
 
+_FOLDER = click.Path(path_type=Path, file_okay=False)
+_THERE = click.Path(path_type=Path, exists=True)
+_TRAININGS = "Trained networks (default: OUT/trainings); those of another run are used where they fit."
+_MODEL = "One more row: a model of your own, path.py:Class, or an installed one."
+
 
 @click.command("run", epilog="Example: semgrid-eval run baselines --logs logs --out runs/first")
 @click.argument("matrix")
-@click.option("--logs", required=True, type=click.Path(path_type=Path, exists=True), help="Folder of MCAP logs.")
-@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the run.")
-@click.option("--grids", type=click.Path(path_type=Path, file_okay=False), help="Grid cache (default: OUT/grids).")
-@click.option(
-    "--validation-logs",
-    type=click.Path(path_type=Path, exists=True),
-    help="Folder of the logs to score, where they are not in --logs.",
-)
-@click.option(
-    "--trainings",
-    type=click.Path(path_type=Path, file_okay=False, exists=True),
-    help="Trained networks (default: OUT/trainings); those of another run are used where they fit.",
-)
-@click.option(
-    "--model", "models", multiple=True, help="One more row: a model of your own, path.py:Class, or an installed one."
-)
+@click.option("--logs", required=True, type=_THERE, help="Folder of MCAP logs.")
+@click.option("--out", required=True, type=_FOLDER, help="Folder of the run.")
+@click.option("--grids", type=_FOLDER, help="Grid cache (default: OUT/grids).")
+@click.option("--validation-logs", type=_THERE, help="Folder of the logs to score, where they are not in --logs.")
+@click.option("--trainings", type=click.Path(path_type=Path, file_okay=False, exists=True), help=_TRAININGS)
+@click.option("--model", "models", multiple=True, help=_MODEL)
 @click.option("--row", "only", multiple=True, help="Only this row, or rows like 'BL-*'; may be repeated.")
 @device_option
 @click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Rows trained at once.")
@@ -88,15 +83,7 @@ def command(
     # A cluster that is started here has --jobs cores, and grids are to be built on --workers.
     grids_on = local_executor(workers) if address == LOCAL else chosen_executor(executor, address, workers)
     options = RunOptions(
-        device,
-        grids or out / "grids",
-        command_line(),
-        only,
-        rows_on,
-        grids_on,
-        pictures,
-        validation_logs,
-        trainings,
+        device, grids or out / "grids", command_line(), only, rows_on, grids_on, pictures, validation_logs, trainings
     )
     if dry_run:
         return _show_plan(resolved, logs, out, options)

@@ -32,14 +32,9 @@ def executor_options(command: Command) -> Command:
 def chosen_executor(
     name: str, address: str, workers: int, *, gpus: float = 0.0, shared: Sequence[str] = ()
 ) -> Executor:
-    """Make the executor that options ask for.
+    """Make the executor that options ask for, `local` or `ray`.
 
-    Args:
-        name: `local` or `ray`.
-        address: of a Ray cluster.
-        workers: pieces of work at once, where that is not for a cluster to say.
-        gpus: for each piece of work on Ray.
-        shared: GPUs that local processes share, as CUDA names them.
+    `gpus` are for each piece of work on Ray, `shared` the GPUs that local processes share, as CUDA names them.
 
     Raises:
         MissingExtraError: Ray is asked for and not installed.

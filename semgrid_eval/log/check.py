@@ -17,13 +17,7 @@ from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.png import decode_gray, read_header
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame, MotionSample
 
-# What a road vehicle and its stereo camera can plausibly be; beyond: a wrong unit or sign, or a broken sensor.
-FOCAL_PER_WIDTH = (0.2, 5.0)
-FOCAL_RATIO = (0.9, 1.1)
-CENTRE_PER_SIZE = (0.2, 0.8)
-BASELINE_M = (0.03, 2.0)
-CAMERA_HEIGHT_M = (0.3, 4.0)
-CAMERA_ANGLE_RAD = (-0.5, 0.5)
+# What a road vehicle can plausibly do; beyond: a wrong unit or sign, or a broken sensor.
 SPEED_MPS = (-15.0, 70.0)
 YAW_RATE_RADPS = (-1.5, 1.5)
 ACCELERATION_MPS2 = (-20.0, 20.0)
@@ -35,9 +29,7 @@ _LAST_TRAIN_ID = max(label.train_id for label in CITYSCAPES_LABELS if label.trai
 _NS_PER_S = 1e9
 
 _SCHEMAS = {
-    topics.DISPARITY: "foxglove.CompressedImage",
-    topics.LABEL: "foxglove.CompressedImage",
-    topics.IMAGE: "foxglove.CompressedImage",
+    **dict.fromkeys((topics.DISPARITY, topics.LABEL, topics.IMAGE), "foxglove.CompressedImage"),
     topics.CALIBRATION: "foxglove.CameraCalibration",
     topics.STEREO: "semgrid.v1.StereoCalibration",
 }
@@ -228,17 +220,17 @@ def _require_size(frame: CameraFrame, size: tuple[int, int] | None) -> tuple[int
 
 
 def _calibration(calibration: CameraCalibration, topic: str, size: tuple[int, int]) -> Iterator[Finding]:
-    width, height = size
+    """Compare with what a road vehicle's stereo camera can plausibly be, for pictures of a size (width, height)."""
     plausible = {
-        "fx_px / width": (calibration.fx_px / width, FOCAL_PER_WIDTH),
-        "fy_px / fx_px": (calibration.fy_px / calibration.fx_px, FOCAL_RATIO),
-        "u0_px / width": (calibration.u0_px / width, CENTRE_PER_SIZE),
-        "v0_px / height": (calibration.v0_px / height, CENTRE_PER_SIZE),
-        "baseline_m": (calibration.baseline_m, BASELINE_M),
-        "z_m": (calibration.z_m, CAMERA_HEIGHT_M),
-        "roll_rad": (calibration.roll_rad, CAMERA_ANGLE_RAD),
-        "pitch_rad": (calibration.pitch_rad, CAMERA_ANGLE_RAD),
+        "fx_px / width": (calibration.fx_px / size[0], 0.2, 5.0),
+        "fy_px / fx_px": (calibration.fy_px / calibration.fx_px, 0.9, 1.1),
+        "u0_px / width": (calibration.u0_px / size[0], 0.2, 0.8),
+        "v0_px / height": (calibration.v0_px / size[1], 0.2, 0.8),
+        "baseline_m": (calibration.baseline_m, 0.03, 2.0),
+        "z_m": (calibration.z_m, 0.3, 4.0),
+        "roll_rad": (calibration.roll_rad, -0.5, 0.5),
+        "pitch_rad": (calibration.pitch_rad, -0.5, 0.5),
     }
-    for name, (value, (low, high)) in plausible.items():
+    for name, (value, low, high) in plausible.items():
         if not low <= value <= high:
             yield _warning(f"{topic}: {name}", f"{value:g} is not within {low:g} to {high:g}")

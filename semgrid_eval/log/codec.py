@@ -1,4 +1,4 @@
-"""Frames, motion and truth as the messages of a log, and back."""
+"""Frames, motion and truth as the messages of a log, and back; reading a damaged message raises DecodeError."""
 
 import math
 
@@ -43,11 +43,7 @@ def image_message(stamp_ns: int, camera: str, png: bytes) -> CompressedImage:
 
 
 def read_image(data: bytes) -> bytes:
-    """Return the PNG file in a message.
-
-    Raises:
-        DecodeError: the message is damaged.
-    """
+    """Return the PNG file in a message."""
     return bytes(CompressedImage.FromString(data).data)
 
 
@@ -82,7 +78,6 @@ def read_calibration(known: bytes, rest: bytes) -> CameraCalibration:
     """Join the two messages of `calibration_messages`.
 
     Raises:
-        DecodeError: a message is damaged.
         ValueError: the camera matrix is incomplete.
         InputError: a value is impossible; the message names the field.
     """
@@ -109,11 +104,7 @@ def motion_message(sample: MotionSample) -> Egomotion:
 
 
 def read_motion(data: bytes) -> MotionSample:
-    """Read what the vehicle reported of its motion.
-
-    Raises:
-        DecodeError: the message is damaged.
-    """
+    """Read what the vehicle reported of its motion."""
     message = Egomotion.FromString(data)
     gps = {name: getattr(message, name) for name in _GPS_FIELDS if message.HasField(name)}
     return MotionSample(stamp_ns(message.timestamp), message.speed_mps, message.yaw_rate_radps, **gps)
@@ -129,11 +120,7 @@ def pose_message(pose: Pose, frame_id: str) -> PoseInFrame:
 
 
 def read_pose(data: bytes) -> Pose:
-    """Read a planar pose; its yaw comes back within rounding, but for whole double turns, and gives the same message.
-
-    Raises:
-        DecodeError: the message is damaged.
-    """
+    """Read a planar pose; its yaw comes back within rounding and but for double turns, and gives the same message."""
     message = PoseInFrame.FromString(data)
     position = message.pose.position
     return Pose(stamp_ns(message.timestamp), position.x, position.y, _yaw_rad(message.pose.orientation))
@@ -146,11 +133,7 @@ def actors_message(stamp_ns: int, actors: tuple[Actor, ...]) -> Actors:
 
 
 def read_actors(data: bytes) -> tuple[int, tuple[Actor, ...]]:
-    """Read the true boxes of all actors and their time.
-
-    Raises:
-        DecodeError: the message is damaged.
-    """
+    """Read the true boxes of all actors and their time."""
     message = Actors.FromString(data)
     boxes = (Actor(**{name: getattr(actor, name) for name in _ACTOR_FIELDS}) for actor in message.actors)
     return stamp_ns(message.timestamp), tuple(boxes)
@@ -178,8 +161,7 @@ def transforms_message(
 def _transform(
     time: Timestamp, parent: str, child: str, position: tuple[float, float, float], rotation: Quaternion
 ) -> FrameTransform:
-    x, y, z = position
-    translation = Vector3(x=x, y=y, z=z)
+    translation = Vector3(**dict(zip("xyz", position, strict=True)))
     return FrameTransform(
         timestamp=time, parent_frame_id=parent, child_frame_id=child, translation=translation, rotation=rotation
     )
@@ -198,5 +180,5 @@ def _yaw_rad(turn: Quaternion) -> float:
 
 
 def _optical_rotation(calibration: CameraCalibration) -> Quaternion:
-    x, y, z, w = optical_quaternion(calibration.roll_rad, calibration.pitch_rad, calibration.yaw_rad)
-    return Quaternion(x=x, y=y, z=z, w=w)
+    turn = optical_quaternion(calibration.roll_rad, calibration.pitch_rad, calibration.yaw_rad)
+    return Quaternion(**dict(zip("xyzw", turn, strict=True)))

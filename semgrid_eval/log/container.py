@@ -5,7 +5,7 @@ import heapq
 import io
 import struct
 import zlib
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -13,22 +13,10 @@ from typing import BinaryIO, NamedTuple
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
 from google.protobuf.message import DecodeError
+from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    Chunk,
-    ChunkIndex,
-    McapRecord,
-    Message,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-)
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC as MAGIC
@@ -61,7 +49,7 @@ def damage_as_log_error(path: Path) -> Iterator[None]:
 class Entry(NamedTuple):
     """One message as it is stored in the file."""
 
-    channel_id: int
+    topic: str
     log_ns: int
     data: bytes
 
@@ -77,12 +65,11 @@ class Container:
         self.path = path
         with damage_as_log_error(path):
             self._stream = path.open("rb")
-        try:
-            with damage_as_log_error(path):
+            try:
                 self._load()
-        except BaseException:
-            self._stream.close()
-            raise
+            except BaseException:
+                self._stream.close()
+                raise
 
     def close(self) -> None:
         """Close the file."""
@@ -103,7 +90,9 @@ class Container:
         Raises:
             LogError: what is read is damaged.
         """
-        wanted = self._channel_ids(topics)
+        channels = self.summary.channels
+        names = None if topics is None else set(topics)
+        wanted = {number: each.topic for number, each in channels.items() if names is None or each.topic in names}
         chunks = [index for index in self.summary.chunk_indexes if _may_hold(index, wanted)]
         chunks.sort(key=lambda index: (index.message_start_time, index.chunk_start_offset))
         starts_ns = [index.message_start_time for index in chunks[1:]]
@@ -127,7 +116,7 @@ class Container:
             raise LogError(f"has {len(found)} metadata records {name}", path=self.path)
         with damage_as_log_error(self.path):
             body = self._record(Opcode.METADATA, found[0].offset, found[0].length)
-            record: Metadata = Metadata.read(ReadDataStream(io.BytesIO(body)))
+            record: records.Metadata = records.Metadata.read(ReadDataStream(io.BytesIO(body)))
             return record.metadata
 
     def attachments(self) -> dict[str, bytes]:
@@ -145,7 +134,7 @@ class Container:
                 crc = int.from_bytes(body[-4:], "little")
                 if crc and crc != zlib.crc32(body[:-4]):
                     raise McapError(f"the checksum of attachment {index.name!r} does not match")
-                attachment: Attachment = Attachment.read(ReadDataStream(io.BytesIO(body)))
+                attachment: records.Attachment = records.Attachment.read(ReadDataStream(io.BytesIO(body)))
                 found[index.name] = attachment.data
         return found
 
@@ -194,15 +183,9 @@ class Container:
             raise McapError("its index is incomplete")
         self.message_count = statistics.message_count
 
-    def _channel_ids(self, topics: Iterable[str] | None) -> Collection[int]:
-        if topics is None:
-            return self.summary.channels.keys()
-        names = set(topics)
-        return {number for number, channel in self.summary.channels.items() if channel.topic in names}
-
-    def _chunk_entries(self, index: ChunkIndex, wanted: Collection[int]) -> Iterator[Entry]:
+    def _chunk_entries(self, index: records.ChunkIndex, wanted: Mapping[int, str]) -> Iterator[Entry]:
         with damage_as_log_error(self.path):
-            found = [record for record in self._chunk_records(index) if isinstance(record, Message)]
+            found = [record for record in self._chunk_records(index) if isinstance(record, records.Message)]
             for message in found:
                 if message.channel_id not in self.summary.channels:
                     raise McapError(f"a message belongs to the unknown channel {message.channel_id}")
@@ -210,11 +193,11 @@ class Container:
                     raise McapError("a message is outside the times that the index gives")
         for message in found:
             if message.channel_id in wanted:
-                yield Entry(message.channel_id, message.log_time, message.data)
+                yield Entry(wanted[message.channel_id], message.log_time, message.data)
 
-    def _chunk_records(self, index: ChunkIndex) -> list[McapRecord]:
+    def _chunk_records(self, index: records.ChunkIndex) -> list[records.McapRecord]:
         body = self._record(Opcode.CHUNK, index.chunk_start_offset, index.chunk_length)
-        chunk = Chunk.read(ReadDataStream(io.BytesIO(body)))
+        chunk = records.Chunk.read(ReadDataStream(io.BytesIO(body)))
         declared = (index.compression, index.compressed_size, index.uncompressed_size)
         if (chunk.compression, len(chunk.data), chunk.uncompressed_size) != declared:
             raise McapError("a chunk is not what the index says")
@@ -243,12 +226,12 @@ def _exactly(stream: BinaryIO, length: int) -> bytes:
     return data
 
 
-def _may_hold(index: ChunkIndex, wanted: Collection[int]) -> bool:
+def _may_hold(index: records.ChunkIndex, wanted: Iterable[int]) -> bool:
     channels = index.message_index_offsets
     return not channels or any(number in channels for number in wanted)
 
 
-def _decompress(chunk: Chunk) -> bytes:
+def _decompress(chunk: records.Chunk) -> bytes:
     """Unpack a chunk into exactly the size it declares, never allocating more."""
     size = chunk.uncompressed_size
     if size > MAX_CHUNK_BYTES:
@@ -272,16 +255,16 @@ def _parse_summary(summary: bytes) -> Summary:
     result = Summary()
     for record in StreamReader(io.BytesIO(summary), skip_magic=True, record_size_limit=len(summary)).records:
         match record:
-            case Schema():
+            case records.Schema():
                 result.schemas[record.id] = record
-            case Channel():
+            case records.Channel():
                 result.channels[record.id] = record
-            case ChunkIndex():
+            case records.ChunkIndex():
                 result.chunk_indexes.append(record)
-            case AttachmentIndex():
+            case records.AttachmentIndex():
                 result.attachment_indexes.append(record)
-            case MetadataIndex():
+            case records.MetadataIndex():
                 result.metadata_indexes.append(record)
-            case Statistics():
+            case records.Statistics():
                 result.statistics = record
     return result

@@ -1,6 +1,7 @@
 """Convert recordings to logs, several at once: what is done is skipped, what fails is named, the rest goes on."""
 
 import errno
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,19 +18,12 @@ _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 @dataclass(frozen=True)
 class Work:
-    """How a conversion is carried out; none of it changes what is written.
+    """How a conversion is carried out; none of it changes what is written."""
 
-    Args:
-        workers: processes of this machine at once.
-        executor: where recordings are converted; by default in those processes.
-        cache: folder of what a source keeps beside the logs; by default in the folder of the logs.
-        stage: shows progress.
-    """
-
-    workers: int = 1
-    executor: Executor | None = None
-    cache: Path | None = None
-    stage: Stage = silent_stage
+    workers: int = 1  # processes of this machine at once
+    executor: Executor | None = None  # where recordings are converted; by default in those processes
+    cache: Path | None = None  # folder of what a source keeps beside the logs; by default in the folder of the logs
+    stage: Stage = silent_stage  # shows progress
 
 
 IN_PROCESS = Work()
@@ -37,19 +31,12 @@ IN_PROCESS = Work()
 
 @dataclass(frozen=True)
 class ConversionJob:
-    """One recording to convert; it travels to another process, so `digest` and `load` must be picklable.
+    """One recording to convert; it travels to another process, so `digest` and `load` must be picklable."""
 
-    Args:
-        name: of the recording, a valid file name without suffix.
-        split: the folder its log goes to.
-        digest: digest of everything that determines the content, or what computes it (in the other process).
-        load: returns the recording.
-    """
-
-    name: str
-    split: str
-    digest: str | Callable[[], str]
-    load: Callable[[], Recording]
+    name: str  # of the recording, a valid file name without suffix
+    split: str  # the folder its log goes to
+    digest: str | Callable[[], str]  # of all that determines the content, or what computes it (in the other process)
+    load: Callable[[], Recording]  # returns the recording
 
     @property
     def label(self) -> str:
@@ -59,21 +46,13 @@ class ConversionJob:
 
 @dataclass
 class ConversionSummary:
-    """What became of each recording, by split and name (`val/aachen_000000_000000`), sorted.
+    """What became of each recording, by split and name (`val/aachen_000000_000000`), sorted."""
 
-    Args:
-        written: new logs.
-        skipped: logs that are up to date.
-        failed: reasons.
-        all_splits: whether these are all recordings of all splits, so that no other log belongs beside theirs.
-        remark: what else the source has to say, one line.
-    """
-
-    written: list[str] = field(default_factory=list)
-    skipped: list[str] = field(default_factory=list)
-    failed: dict[str, str] = field(default_factory=dict)
-    all_splits: bool = False
-    remark: str = ""
+    written: list[str] = field(default_factory=list)  # new logs
+    skipped: list[str] = field(default_factory=list)  # logs that are up to date
+    failed: dict[str, str] = field(default_factory=dict)  # reasons
+    all_splits: bool = False  # these are all recordings of all splits: no other log belongs beside theirs
+    remark: str = ""  # what else the source has to say, one line
 
     @property
     def labels(self) -> set[str]:
@@ -97,12 +76,6 @@ def convert_jobs(
 
     A log that is whole and was made from inputs of the same digest is left as it is. A recording that fails, because
     its source is at fault, is named in the summary with its reason.
-
-    Args:
-        jobs: the recordings.
-        out: the folder of all logs.
-        work: how it is done.
-        label: what progress is called.
 
     Raises:
         InputError: two recordings have one name, or the disk is full.
@@ -175,8 +148,6 @@ def _is_current(path: Path, digest: str) -> bool:
 
 
 def _refuse_duplicates(jobs: Sequence[ConversionJob]) -> None:
-    seen: set[str] = set()
-    for job in jobs:
-        if job.label in seen:
-            raise InputError("two recordings have this name", field=job.label)
-        seen.add(job.label)
+    for label, count in Counter(job.label for job in jobs).items():
+        if count > 1:
+            raise InputError("two recordings have this name", field=label)

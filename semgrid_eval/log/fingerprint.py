@@ -53,18 +53,13 @@ def kept_fingerprints(
 ) -> dict[str, str]:
     """Return the fingerprints of logs by their digests; a log that is damaged somewhere has none.
 
-    Args:
-        logs: paths by digest.
-        cache: folder that keeps what was found, so that it is found once.
-        executor: reads the logs.
-        progress: called for each log that is read.
+    The folder `cache` keeps what was found, so that it is found once.
     """
     kept = _kept(cache / KEPT)
     missing = [digest for digest in logs if digest not in kept]
     try:
-        for index, outcome in _outcomes(
-            _fingerprint_if_sound, [logs[digest] for digest in missing], executor, progress
-        ):
+        paths = [logs[digest] for digest in missing]
+        for index, outcome in _outcomes(_fingerprint_if_sound, paths, executor, progress):
             if isinstance(outcome, str):
                 kept[missing[index]] = outcome
     finally:

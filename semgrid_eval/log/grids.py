@@ -1,7 +1,6 @@
 """Bird's-eye grids as messages: coloured for viewers, exact for programs."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.Grid_pb2 import Grid
@@ -12,7 +11,7 @@ from foxglove_schemas_protobuf.Vector2_pb2 import Vector2
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, MASK_COLOUR, UNKNOWN, class_palette
+from semgrid_eval.classes import CLASS_NAMES, MASK_COLOUR, UNKNOWN, class_palette
 from semgrid_eval.log.codec import timestamp
 from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
 from semgrid_eval.log.topics import GRID_FRAME
@@ -32,42 +31,24 @@ class GridPlace:
 
 @dataclass(frozen=True, eq=False)
 class GridLayer:
-    """What the values of a grid mean.
+    """What the values of a grid mean."""
 
-    Args:
-        field: name of the values.
-        rgba: (256, 4) sRGB and opacity by value.
-        names: by value.
-    """
-
-    field: str
-    rgba: Values
-    names: tuple[str, ...] = ()
+    field: str  # name of the values
+    rgba: Values  # (256, 4) sRGB and opacity by value
+    names: tuple[str, ...] = ()  # by value
 
 
-def _class_colours() -> Values:
+def _rgba(colours: NDArray[np.integer], first: int = 0) -> Values:
+    """Return (256, 4): sRGB colours (N, 3), opaque, of the values from `first` on; all others are transparent."""
     rgba = np.zeros((256, 4), np.uint8)
-    rgba[:CLASS_COUNT, :3] = class_palette()
-    rgba[:CLASS_COUNT, 3] = 255
-    rgba[UNKNOWN, 3] = 0  # layers that are drawn over each other do not hide what another one knows
+    rgba[first : first + len(colours)] = np.insert(colours, 3, 255, axis=1)
     return rgba
 
 
-def _mask_colours() -> Values:
-    rgba = np.zeros((256, 4), np.uint8)
-    rgba[1] = (*MASK_COLOUR, 255)
-    return rgba
-
-
-def _grey_ramp() -> Values:
-    rgba = np.full((256, 4), 255, np.uint8)
-    rgba[:, :3] = np.arange(256)[:, None]
-    return rgba
-
-
-CLASSES = GridLayer("class_id", _class_colours(), CLASS_NAMES)
-MASK = GridLayer("masked", _mask_colours(), ("scored", "left_out"))
-CERTAINTY = GridLayer("certainty", _grey_ramp())
+CLASSES = GridLayer("class_id", _rgba(class_palette()), CLASS_NAMES)
+CLASSES.rgba[UNKNOWN, 3] = 0  # layers that are drawn over each other do not hide what another one knows
+MASK = GridLayer("masked", _rgba(np.array([MASK_COLOUR]), first=1), ("scored", "left_out"))
+CERTAINTY = GridLayer("certainty", _rgba(np.repeat(np.arange(256)[:, None], 3, axis=1)))
 """Layers of grids: class ids, the mask M (1 = left out of scores), the highest score of a cell (255 = 1)."""
 
 
@@ -80,23 +61,17 @@ def viewer_message(stamp_ns: int, values: Values, layer: GridLayer, place: GridP
     along_x = values[::-1, ::-1].T  # (W, H): first row farthest right, first column nearest
     cells = np.concatenate([layer.rgba[along_x], along_x[..., None]], axis=-1)  # (W, H, 5)
     fields = (*_COLOURS, layer.field)
+    corner = Vector3(x=place.corner_x_m - rows * place.cell_m, y=place.corner_y_m - columns * place.cell_m, z=0.0)
+    uint8 = PackedElementField.UINT8
     return Grid(
         timestamp=timestamp(stamp_ns),
         frame_id=GRID_FRAME,
-        pose=Pose(
-            position=Vector3(
-                x=place.corner_x_m - rows * place.cell_m, y=place.corner_y_m - columns * place.cell_m, z=0.0
-            ),
-            orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
-        ),
+        pose=Pose(position=corner, orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
         column_count=rows,
         cell_size=Vector2(x=place.cell_m, y=place.cell_m),
         row_stride=rows * len(fields),
         cell_stride=len(fields),
-        fields=[
-            PackedElementField(name=name, offset=offset, type=PackedElementField.UINT8)
-            for offset, name in enumerate(fields)
-        ],
+        fields=[PackedElementField(name=name, offset=offset, type=uint8) for offset, name in enumerate(fields)],
         data=cells.tobytes(),
     )
 
@@ -115,16 +90,3 @@ def exact_message(stamp_ns: int, values: Values, layer: GridLayer, place: GridPl
         class_ids=np.ascontiguousarray(values, np.uint8).tobytes(),
         class_names=layer.names,
     )
-
-
-def read_exact(data: bytes) -> tuple[Values, GridPlace]:
-    """Read the values (H, W) of an exact message, and where the grid is.
-
-    Raises:
-        DecodeError: the message is damaged.
-        ValueError: it holds another number of cells than it states.
-    """
-    message = SemanticGrid.FromString(data)
-    place = GridPlace(message.cell_size_m, message.corner_x_m, message.corner_y_m)
-    values: NDArray[Any] = np.frombuffer(message.class_ids, np.uint8)
-    return values.reshape(message.rows, message.columns), place

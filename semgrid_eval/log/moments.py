@@ -1,7 +1,6 @@
 """The moments of a recording as messages in the order of time, and back."""
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
 from itertools import groupby, product
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.motion import EgoMotion
 from semgrid_eval.recording.png import read_header, with_palette
-from semgrid_eval.recording.types import Actor, CameraFrame, Moment, MotionSample, Pose, Recording
+from semgrid_eval.recording.types import CameraFrame, Moment, MotionSample, Recording
 
 
 class MomentWriter:
@@ -44,9 +43,8 @@ class MomentWriter:
 
     def _advance(self, stamp_ns: int, what: str) -> None:
         if stamp_ns < self._last_ns:
-            raise InputError(
-                f"{what} at {stamp_ns} ns comes after {self._last_ns} ns", field=f"{self._recording.name}: stamp_ns"
-            )
+            message = f"{what} at {stamp_ns} ns comes after {self._last_ns} ns"
+            raise InputError(message, field=f"{self._recording.name}: stamp_ns")
         self._last_ns = stamp_ns
 
     def _motion(self, moment: Moment) -> None:
@@ -125,42 +123,23 @@ def gather_moments(messages: Iterable[Decoded], cameras: Iterable[str]) -> Itera
     A moment is all that has one stamp; motion belongs to the moment that comes next.
     """
     shown = picture_topics(cameras, topics.PICTURE_FIELDS)
-    motion: list[MotionSample] = []
-    gathered: _Gathered | None = None
-    for topic, stamp_ns, value in messages:
-        if topic == topics.EGO_MOTION:
-            motion.append(value)
-            continue
-        if gathered is None or gathered.stamp_ns != stamp_ns:
-            if gathered is not None:
-                yield gathered.moment()
-            gathered = _Gathered(stamp_ns, tuple(motion))
-            motion.clear()
-        gathered.add(topic, shown.get(topic), value)
-    if gathered is not None:
-        yield gathered.moment()
+    waiting: list[MotionSample] = []
+    for stamp_ns, of_one_time in groupby(_apart_from_motion(messages, waiting), key=lambda message: message.stamp_ns):
+        motion = tuple(waiting)
+        waiting.clear()
+        found = {topic: value for topic, _, value in of_one_time}
+        pictures = [Picture(stamp_ns, *shown[topic], value) for topic, value in found.items() if topic in shown]
+        _, actors = found.get(topics.TRUE_ACTORS, (stamp_ns, None))
+        yield Moment(stamp_ns, dict(camera_frames(pictures)), motion, found.get(topics.TRUE_POSE), actors)
 
 
-@dataclass
-class _Gathered:
-    """What was read of one moment so far."""
-
-    stamp_ns: int
-    motion: tuple[MotionSample, ...]
-    pose: Pose | None = None
-    actors: tuple[Actor, ...] | None = None
-    pictures: list[Picture] = field(default_factory=list)
-
-    def add(self, topic: str, shown: tuple[str, str] | None, value: Any) -> None:  # noqa: ANN401 - by topic
-        if shown is not None:
-            self.pictures.append(Picture(self.stamp_ns, *shown, value))
-        elif topic == topics.TRUE_POSE:
-            self.pose = value
-        elif topic == topics.TRUE_ACTORS:
-            _, self.actors = value
-
-    def moment(self) -> Moment:
-        return Moment(self.stamp_ns, dict(camera_frames(self.pictures)), self.motion, self.pose, self.actors)
+def _apart_from_motion(messages: Iterable[Decoded], motion: list[MotionSample]) -> Iterator[Decoded]:
+    """Pass messages on, but move what they say of the motion to a list."""
+    for message in messages:
+        if message.topic == topics.EGO_MOTION:
+            motion.append(message.value)
+        else:
+            yield message
 
 
 def camera_frames(pictures: Iterable[Picture]) -> Iterator[tuple[str, CameraFrame]]:

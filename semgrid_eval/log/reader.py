@@ -9,14 +9,7 @@ from typing import Any, Self, TypeVar
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.container import Container, Entry, damage_as_log_error
-from semgrid_eval.log.moments import (
-    Decoded,
-    Picture,
-    camera_frames,
-    gather_moments,
-    moment_decoders,
-    picture_topics,
-)
+from semgrid_eval.log.moments import Decoded, Picture, camera_frames, gather_moments, moment_decoders, picture_topics
 from semgrid_eval.log.scene import RECORD, Scene
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose
@@ -28,7 +21,8 @@ class LogReader:
     """One log, read lazily; closes its file with its block, or by `close`.
 
     Raises:
-        LogError: the file cannot be read, is damaged, was not written to the end, or is not a log of this package.
+        LogError: the file cannot be read, is damaged, was not written to the end, or is not a log of this package;
+            damage that only shows when more is read is raised then, by every method that reads.
     """
 
     def __init__(self, path: Path) -> None:
@@ -106,12 +100,11 @@ class LogReader:
         """
         found: dict[str, list[int]] = {topic: [] for topic in self.schemas()}
         for entry in self._container.entries():
-            found[self._topic(entry)].append(entry.log_ns)
+            found[entry.topic].append(entry.log_ns)
         count = sum(len(stamps) for stamps in found.values())
         if count != self._container.message_count:
-            raise LogError(
-                f"holds {count} messages, but its index states {self._container.message_count}", path=self.path
-            )
+            stated = self._container.message_count
+            raise LogError(f"holds {count} messages, but its index states {stated}", path=self.path)
         return found
 
     def calibration(self, camera: str) -> CameraCalibration:
@@ -144,36 +137,20 @@ class LogReader:
         return samples
 
     def poses(self) -> list[Pose]:
-        """Return the true poses in the order of time; none where the truth is not known.
-
-        Raises:
-            LogError: a pose is damaged.
-        """
+        """Return the true poses in the order of time; none where the truth is not known."""
         return list(self._values(topics.TRUE_POSE, codec.read_pose))
 
     def actors(self) -> Iterator[tuple[int, tuple[Actor, ...]]]:
-        """Iterate over time stamps (ns) and the true boxes of all actors; nothing where the truth is not known.
-
-        Raises:
-            LogError: what is read is damaged.
-        """
+        """Iterate over time stamps (ns) and the true boxes of all actors; nothing where the truth is not known."""
         return self._values(topics.TRUE_ACTORS, codec.read_actors)
 
     def moments(self) -> Iterator[Moment]:
-        """Iterate over all that the log holds, moment by moment, in the order of time.
-
-        Raises:
-            LogError: what is read is damaged.
-        """
+        """Iterate over all that the log holds, moment by moment, in the order of time."""
         cameras = self.scene.cameras
         return gather_moments(self._decoded(moment_decoders(cameras)), cameras)
 
     def pictures(self, cameras: Iterable[str], channels: Iterable[str]) -> Iterator[Picture]:
-        """Iterate over the pictures of some channels of some cameras in the order of time.
-
-        Raises:
-            LogError: what is read is damaged.
-        """
+        """Iterate over the pictures of some channels of some cameras in the order of time."""
         wanted = picture_topics(cameras, channels)
         for topic, stamp_ns, png in self._decoded(dict.fromkeys(wanted, codec.read_image)):
             yield Picture(stamp_ns, *wanted[topic], png)
@@ -189,32 +166,19 @@ class LogReader:
             images: whether to read the colour images as well.
 
         Raises:
-            LogError: there is no such camera, or what is read is damaged.
+            LogError: there is no such camera.
         """
         self.choose_camera(camera)
         channels = [channel for channel in topics.PICTURE_FIELDS if images or channel != topics.IMAGE]
-        for _, frame in camera_frames(self.pictures([camera], channels)):
-            yield frame
+        return (frame for _, frame in camera_frames(self.pictures([camera], channels)))
 
-    def messages(self, names: Iterable[str]) -> Iterator[tuple[str, int, bytes]]:
-        """Iterate over topic, time (ns) and data of some topics' messages, in the order of time, then of the file.
-
-        Raises:
-            LogError: what is read is damaged.
-        """
-        for entry in self._container.entries(names):
-            yield self._topic(entry), entry.log_ns, entry.data
+    def messages(self, names: Iterable[str]) -> Iterator[Entry]:
+        """Iterate over topic, time (ns) and data of some topics' messages, in the order of time, then of the file."""
+        return self._container.entries(names)
 
     def source_files(self) -> dict[str, bytes]:
-        """Return the source's files that are kept for the record, by name.
-
-        Raises:
-            LogError: one is damaged.
-        """
+        """Return the source's files that are kept for the record, by name."""
         return self._container.attachments()
-
-    def _topic(self, entry: Entry) -> str:
-        return self._container.summary.channels[entry.channel_id].topic
 
     def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
         """Iterate over what the messages of some topics say; `decoders` maps topics to what reads their messages."""
@@ -227,6 +191,7 @@ class LogReader:
         return (decoded.value for decoded in self._decoded({topic: decode}))
 
     def _first(self, topic: str) -> bytes:
-        for entry in self._container.entries([topic]):
-            return entry.data
-        raise LogError("has no message", path=self.path, field=topic)
+        entry = next(self._container.entries([topic]), None)
+        if entry is None:
+            raise LogError("has no message", path=self.path, field=topic)
+        return entry.data

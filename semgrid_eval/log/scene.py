@@ -13,25 +13,15 @@ FORMAT_VERSION = 1
 
 @dataclass(frozen=True)
 class Scene:
-    """A log's name, origin and cameras.
+    """A log's name, origin and cameras."""
 
-    Args:
-        name: unique in its data set.
-        dataset: where the recording comes from: `cityscapes` or `synthetic`.
-        split: `train`, `val` or `test`.
-        cameras: their names, sorted.
-        source_digest: digest of everything that determined the content.
-        class_names: the grid classes when the log was written.
-        group: the town, city or drive that it belongs to; empty where the log does not say.
-    """
-
-    name: str
-    dataset: str
-    split: str
-    cameras: tuple[str, ...]
-    source_digest: str
-    class_names: tuple[str, ...] = CLASS_NAMES
-    group: str = ""
+    name: str  # unique in its data set
+    dataset: str  # where the recording comes from: `cityscapes` or `synthetic`
+    split: str  # `train`, `val` or `test`
+    cameras: tuple[str, ...]  # their names, sorted
+    source_digest: str  # digest of everything that determined the content
+    class_names: tuple[str, ...] = CLASS_NAMES  # the grid classes when the log was written
+    group: str = ""  # the town, city or drive that it belongs to; empty where the log does not say
 
     def to_metadata(self) -> dict[str, str]:
         """Return the entries of the metadata record, with a digest of their own: MCAP has no checksum for them."""

@@ -51,14 +51,8 @@ def write_log(recording: Recording, path: Path) -> None:
     Raises:
         InputError: the source is at fault, its moments are not in the order of time, or the file cannot be written.
     """
-    scene = Scene(
-        name=recording.name,
-        dataset=recording.dataset,
-        split=recording.split,
-        cameras=tuple(sorted(recording.calibrations)),
-        source_digest=recording.source_digest,
-        group=recording.group,
-    )
+    same = {name: getattr(recording, name) for name in ("name", "dataset", "split", "source_digest", "group")}
+    scene = Scene(**same, cameras=tuple(sorted(recording.calibrations)))
     with atomic_file(path) as stream, MessageWriter(stream) as writer:
         writer.metadata(RECORD, scene.to_metadata())
         for name, data in sorted(recording.source_files.items()):

@@ -57,13 +57,16 @@ class MessageWriter:
         """Write one message.
 
         Args:
-            topic: its topic; every message of a topic is of one type.
-            message: the message.
+            topic: all messages of a topic are of one type.
+            message: what it says.
             log_ns: the time it holds for.
             publish_ns: when it could be known, if that is another time.
             notes: metadata of the channel, used at the first message of the topic.
         """
-        channel = self._channel(topic, message, notes or {})
+        if topic not in self._channels:
+            schema = self._schema(message)
+            self._channels[topic] = self._writer.register_channel(topic, "protobuf", schema, notes or {})
+        channel = self._channels[topic]
         self._writer.add_message(
             channel,
             log_time=log_ns,
@@ -76,11 +79,6 @@ class MessageWriter:
     def end_chunk(self) -> None:
         """Begin a new chunk, so that a reader can skip what follows, or what came before, without unpacking it."""
         self._writer.flush()  # type: ignore[no-untyped-call]
-
-    def _channel(self, topic: str, message: Message, notes: dict[str, str]) -> int:
-        if topic not in self._channels:
-            self._channels[topic] = self._writer.register_channel(topic, "protobuf", self._schema(message), notes)
-        return self._channels[topic]
 
     def _schema(self, message: Message) -> int:
         name = message.DESCRIPTOR.full_name

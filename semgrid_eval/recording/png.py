@@ -1,4 +1,7 @@
-"""PNG files as bytes: read headers, decode gray and palette pictures, add palettes to label images without decoding."""
+"""PNG files as bytes: read headers, decode gray and palette pictures, add palettes to label images without decoding.
+
+A `path` is where the bytes come from, for error messages.
+"""
 
 import io
 import struct
@@ -45,10 +48,6 @@ class _Chunk(NamedTuple):
 def read_header(data: bytes, path: Path | None = None) -> PngHeader:
     """Read the header of a PNG file and make sure that the file is whole.
 
-    Args:
-        data: the whole file.
-        path: where it comes from, for error messages.
-
     Raises:
         InputError: it is not a PNG file, a chunk's checksum is wrong, its end is missing, it has several headers, or
             its size is out of bounds.
@@ -70,13 +69,8 @@ def read_header(data: bytes, path: Path | None = None) -> PngHeader:
 def decode_gray(data: bytes, *, bit_depth: int, path: Path | None = None) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """Decode a gray picture, or the indices of a palette picture, exactly: (H, W) uint8 or uint16.
 
-    Args:
-        data: the whole file.
-        bit_depth: 8 or 16; another depth is an error.
-        path: where it comes from, for error messages.
-
     Raises:
-        InputError: the file is damaged, of another bit depth, or not gray.
+        InputError: the file is damaged, of another depth than `bit_depth` (8 or 16), or not gray.
     """
     header = read_header(data, path)
     if header.bit_depth != bit_depth or header.colour_type not in (GRAY, PALETTE):
@@ -122,12 +116,7 @@ def encode_gray(picture: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
 
 
 def with_palette(data: bytes, palette: NDArray[np.uint8], path: Path | None = None) -> bytes:
-    """Turn an 8-bit gray PNG file into a palette file whose compressed pixels are untouched.
-
-    Args:
-        data: the whole file; an 8-bit palette file gets the new palette.
-        palette: sRGB colours (256, 3).
-        path: where it comes from, for error messages.
+    """Turn an 8-bit gray or palette PNG file into one of an sRGB palette (256, 3), its compressed pixels untouched.
 
     Raises:
         InputError: the file is damaged, not 8 bit or not gray.
@@ -163,8 +152,6 @@ def _chunks(data: bytes, path: Path | None) -> Iterator[_Chunk]:
     start = len(_SIGNATURE)
     kind = b""
     while kind != b"IEND":
-        if start + _CHUNK_OVERHEAD_BYTES > len(data):
-            raise InputError("is a damaged PNG file: it ends early", path=path)
         end = start + _CHUNK_OVERHEAD_BYTES + int.from_bytes(view[start : start + 4], "big")
         if end > len(data):
             raise InputError("is a damaged PNG file: it ends early", path=path)

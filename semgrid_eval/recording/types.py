@@ -97,24 +97,13 @@ class Moment:
 
 @dataclass(frozen=True)
 class Recording:
-    """One stretch of driving, streamed moment by moment.
+    """One stretch of driving, streamed moment by moment."""
 
-    Args:
-        name: unique in its data set, a valid file name without suffix (Cityscapes: `city_sequence_frame0`).
-        dataset: where it comes from: `cityscapes` or `synthetic`.
-        split: `train`, `val` or `test`.
-        calibrations: by camera name.
-        source_digest: digest of everything that determines the content.
-        moments: starts a new pass over the recording, in the order of time.
-        source_files: one file's bytes by attachment name (`front_camera.json`), kept for the record.
-        group: the town, city or drive that it belongs to, with other recordings that may depend on it.
-    """
-
-    name: str
-    dataset: str
-    split: str
-    calibrations: dict[str, CameraCalibration]
-    source_digest: str
-    moments: Callable[[], Iterator[Moment]]
-    source_files: dict[str, bytes] = field(default_factory=dict)
-    group: str = ""
+    name: str  # unique in its data set, a valid file name without suffix (Cityscapes: `city_sequence_frame0`)
+    dataset: str  # where it comes from: `cityscapes` or `synthetic`
+    split: str  # `train`, `val` or `test`
+    calibrations: dict[str, CameraCalibration]  # by camera name
+    source_digest: str  # digest of everything that determines the content
+    moments: Callable[[], Iterator[Moment]]  # starts a new pass over the recording, in the order of time
+    source_files: dict[str, bytes] = field(default_factory=dict)  # by attachment name (`front_camera.json`)
+    group: str = ""  # the town, city or drive that it belongs to, with other recordings that may depend on it

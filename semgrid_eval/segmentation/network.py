@@ -32,10 +32,6 @@ class _Tensor(NamedTuple):
 class SegmentationNetwork:
     """Labels colour images.
 
-    Args:
-        path: the ONNX file.
-        config: what the file does not say.
-
     Raises:
         MissingExtraError: ONNX Runtime is not installed.
         InputError: the file is not an ONNX model, or does not turn one image into classes as the config says.

@@ -27,12 +27,8 @@ def network_input(
 def best_class(scores: NDArray[np.floating], size: Size, *, smooth: bool) -> NDArray[np.uint8]:
     """Resize scores and take the class of the highest, the first of equal ones: (C, h, w) -> (H, W).
 
-    One class is scaled at a time, so that the scores of all at full size are never in memory.
-
-    Args:
-        scores: of at most 256 classes.
-        size: of the result.
-        smooth: interpolate scores (bilinear, by the centres of pixels) instead of taking the nearest.
+    One class, of at most 256, is scaled at a time, so that the scores of all at full size are never in memory. Smooth
+    scores are interpolated (bilinear, by the centres of pixels); otherwise the nearest is taken.
     """
     smooth = smooth and size != size_of(scores[0])
     best = _plane(scores[0], size, smooth=smooth)

@@ -52,16 +52,11 @@ def segment_logs(
     return convert_jobs([_job(path, recipe) for path in paths], out, work, label="segment")
 
 
-def relabelled(recording: Recording, label: Labeller) -> Recording:
-    """Replace the label images of a recording by what `label` returns for its colour images, (H, W, 3) -> (H, W).
+def _relabelled(recording: Recording, label: Labeller) -> Iterator[Moment]:
+    """Iterate over moments whose label images are what `label` returns for their colour images, (H, W, 3) -> (H, W).
 
-    A frame without colour image has no label image then; if none has one, the pass over the moments ends with an
-    InputError.
+    A frame without colour image has no label image then; if none has one, the pass ends with an InputError.
     """
-    return replace(recording, moments=partial(_moments, recording, label))
-
-
-def _moments(recording: Recording, label: Labeller) -> Iterator[Moment]:
     count = 0
     for moment in recording.moments():
         cameras = {camera: _relabelled_frame(frame, label) for camera, frame in moment.cameras.items()}
@@ -85,8 +80,10 @@ class _Recipe:
     model_digest: str
     config: SegmentationConfig
 
-    def record(self, log_digest: str) -> dict[str, object]:
-        """Return what made the labels of a log."""
+    def record(self, path: Path) -> dict[str, object]:
+        """Return what makes the labels of a log."""
+        with LogReader(path) as log:
+            log_digest = log.digest
         return {
             "model": self.model.name,
             "model_digest": self.model_digest,
@@ -97,15 +94,16 @@ class _Recipe:
 
     def digest(self, path: Path) -> str:
         """Digest what makes the new log of a log."""
-        return digest_value(self.record(_digest_of(path)))
+        return digest_value(self.record(path))
 
     def recording(self, path: Path) -> Recording:
         """Return the new recording of a log."""
-        record = self.record(_digest_of(path))
-        recording = relabelled(read_recording(path), _network(self.model, self.model_digest, self.config).label)
+        record = self.record(path)
+        recording = read_recording(path)
+        moments = partial(_relabelled, recording, _network(self.model, self.model_digest, self.config).label)
         note = json.dumps(record, indent=2, sort_keys=True).encode()
         files = {**recording.source_files, RECORD: note}
-        return replace(recording, source_digest=digest_value(record), source_files=files)
+        return replace(recording, moments=moments, source_digest=digest_value(record), source_files=files)
 
 
 def _job(path: Path, recipe: _Recipe) -> ConversionJob:
@@ -127,16 +125,10 @@ def _files_of(model: Path) -> list[Path]:
     return sorted(path for path in model.parent.glob(f"{escape(model.name)}*") if path.is_file())
 
 
-def _digest_of(path: Path) -> str:
-    with LogReader(path) as log:
-        return log.digest
-
-
 def _refuse_mixing(logs: Sequence[Path], out: Path) -> None:
     target = out.resolve()
     for path in logs:
         source = path.resolve()
         if source.is_relative_to(target) or target.is_relative_to(source):
-            raise InputError(
-                f"contains or is inside {path}; new logs need a folder of their own", path=out, field="out"
-            )
+            message = f"contains or is inside {path}; new logs need a folder of their own"
+            raise InputError(message, path=out, field="out")

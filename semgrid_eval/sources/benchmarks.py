@@ -35,42 +35,27 @@ class SplitSize(Config):
 class BenchmarkSize(Config):
     """One size of a benchmark.
 
-    Args:
-        seed: of all its towns; sizes have different seeds, so that none trains in a town that another validates in.
-        train: recordings to learn from.
-        val: recordings to score on.
-        fingerprints: the first characters of every recording's, in the order of split and name, with blanks between;
-            null until published.
-        versions: of what made the published recordings, as `versions` returns them.
+    `fingerprints` are the first characters of every recording's, in the order of split and name, with blanks between;
+    null until published.
     """
 
-    seed: int
-    train: SplitSize
-    val: SplitSize
+    seed: int  # of all its towns; sizes have different seeds, so that none trains in a town that another validates in
+    train: SplitSize  # recordings to learn from
+    val: SplitSize  # recordings to score on
     fingerprints: str | None
-    versions: dict[str, str]
+    versions: dict[str, str]  # of what made the published recordings, as `versions` returns them
 
 
 class Benchmark(Config):
-    """A frozen data set; another town, picture or count makes a benchmark of another name.
+    """A frozen data set; another town, picture or count makes a benchmark of another name."""
 
-    Args:
-        name: of the benchmark.
-        width: of the images in pixels.
-        height: of the images in pixels.
-        stereo: as in `SyntheticConfig`, likewise the next two.
-        town_size_m: side of the square that a town's streets cover.
-        duration_s: simulated time of a town.
-        sizes: by name.
-    """
-
-    name: str
-    width: int
-    height: int
-    stereo: Stereo
-    town_size_m: float
-    duration_s: float
-    sizes: dict[SizeName, BenchmarkSize]
+    name: str  # of the benchmark
+    width: int  # of the images in pixels
+    height: int  # of the images in pixels
+    stereo: Stereo  # as in `SyntheticConfig`, likewise the next two
+    town_size_m: float  # side of the square that a town's streets cover
+    duration_s: float  # simulated time of a town
+    sizes: dict[SizeName, BenchmarkSize]  # by name
 
     def dataset(self, size: SizeName) -> str:
         """Return the name that its logs, and the results on them, carry."""
@@ -79,17 +64,11 @@ class Benchmark(Config):
 
 @dataclass(frozen=True)
 class Comparison:
-    """How recordings compare with the published ones.
+    """How recordings compare with the published ones."""
 
-    Args:
-        digest: of the recordings that are here.
-        published: digest of the published ones, None while nothing is published.
-        differing: split and name of those that differ.
-    """
-
-    digest: str
-    published: str | None
-    differing: tuple[str, ...]
+    digest: str  # of the recordings that are here
+    published: str | None  # digest of the published ones, None while nothing is published
+    differing: tuple[str, ...]  # split and name of those that differ
 
 
 def definition_file(name: str) -> Path:

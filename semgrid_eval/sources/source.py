@@ -15,17 +15,11 @@ C = TypeVar("C", bound=Config)
 class Source(Generic[C]):
     """What makes recordings, as the command line offers it.
 
-    Args:
-        options: what can be chosen. Each field is an option, described by its `description`; a path without default is
-            an argument.
-        convert: writes the logs OUT/<split>/<name>.mcap of what is chosen.
-        help: what the command does.
-        example: a use of the command.
-        cache: what the source keeps in the folder `Work.cache`, and where that is by default; empty if nothing.
+    Each field of `options` is an option, described by its `description`; a path without default is an argument.
     """
 
     options: type[C]
-    convert: Callable[[C, Path, Work], ConversionSummary]
-    help: str
-    example: str
-    cache: str = ""
+    convert: Callable[[C, Path, Work], ConversionSummary]  # writes the logs OUT/<split>/<name>.mcap of what is chosen
+    help: str  # what the command does
+    example: str  # a use of the command
+    cache: str = ""  # what the source keeps in the folder `Work.cache`, and where that is by default; empty if nothing

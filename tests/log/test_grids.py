@@ -1,19 +1,12 @@
 import numpy as np
-import pytest
 from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
+from support.exact_grids import read_exact
 
 from semgrid_eval.classes import CLASS_NAMES, CLASSES
-from semgrid_eval.log.grids import (
-    CERTAINTY,
-    MASK,
-    GridPlace,
-    exact_message,
-    read_exact,
-    viewer_message,
-)
+from semgrid_eval.log.grids import CERTAINTY, MASK, GridPlace, exact_message, viewer_message
 from semgrid_eval.log.grids import CLASSES as CLASS_LAYER
 
 ROAD, CAR, PERSON = (CLASS_NAMES.index(name) for name in ("road", "car", "person"))
@@ -92,10 +85,3 @@ def test_exact_message_comes_back_whole(values):
 def test_exact_message_of_a_turned_view_is_row_by_row():
     values = np.arange(6, dtype=np.uint8).reshape(2, 3)
     assert exact_message(9, values.T, CLASS_LAYER, PLACE).class_ids == bytes([0, 3, 1, 4, 2, 5])
-
-
-def test_exact_message_with_missing_cells_is_refused():
-    message = exact_message(9, np.zeros((2, 3), np.uint8), CLASS_LAYER, PLACE)
-    message.class_ids = message.class_ids[:-1]
-    with pytest.raises(ValueError, match="reshape"):
-        read_exact(message.SerializeToString())

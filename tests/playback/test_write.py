@@ -10,13 +10,13 @@ import yaml
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Grid_pb2 import Grid
 from mcap.reader import make_reader
+from support.exact_grids import read_exact
 from support.independent_reader import of_topic, read, reader_script, sha256
 from support.toy_world import FRAME_NS, street
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.log.codec import stamp_ns
-from semgrid_eval.log.grids import read_exact
 from semgrid_eval.log.store import LogReader, write_log
 from semgrid_eval.playback.write import GAP_NS, write_playback
 from semgrid_eval.runs.matrix import load_matrix

@@ -40,13 +40,8 @@ def convert_cityscapes(options: CityscapesOptions, out: Path, work: Work = IN_PR
     Raises:
         InputError: the tree or an option cannot be used, or the disk is full.
     """
-    sequences = find_sequences(
-        options.src,
-        splits=options.split,
-        labels=options.labels,
-        train_ids=options.train_ids,
-        camera_name=options.camera_name,
-    )
+    chosen = options.model_dump(include={"labels", "train_ids", "camera_name"})
+    sequences = find_sequences(options.src, splits=options.split, **chosen)
     jobs = [ConversionJob(name=s.name, split=s.split, digest=s.digest, load=s.recording) for s in sequences]
     return convert_jobs(jobs, out, work)
 

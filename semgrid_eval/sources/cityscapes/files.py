@@ -1,7 +1,11 @@
-"""Read single files of a Cityscapes tree; every fault names the file and, where there is one, the field."""
+"""Read single files of a Cityscapes tree.
+
+What is missing, broken or impossible in one is an InputError that names the file and, where there is one, the field.
+"""
 
 import json
 import math
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -15,29 +19,17 @@ from semgrid_eval.recording.types import CameraCalibration, MotionSample
 
 MAX_FILE_BYTES = 1 << 28
 _LAST_STAMP_NS = (1 << 63) - 1
+# A calibration's fields are Cityscapes' with their unit: fx_px is `intrinsic.fx`, roll_rad `extrinsic.roll`.
 _CAMERA_FIELDS = {
-    "fx_px": ("intrinsic", "fx"),
-    "fy_px": ("intrinsic", "fy"),
-    "u0_px": ("intrinsic", "u0"),
-    "v0_px": ("intrinsic", "v0"),
-    "baseline_m": ("extrinsic", "baseline"),
-    "x_m": ("extrinsic", "x"),
-    "y_m": ("extrinsic", "y"),
-    "z_m": ("extrinsic", "z"),
-    "roll_rad": ("extrinsic", "roll"),
-    "pitch_rad": ("extrinsic", "pitch"),
-    "yaw_rad": ("extrinsic", "yaw"),
+    entry.name: ("intrinsic" if entry.name.endswith("_px") else "extrinsic", entry.name.rpartition("_")[0])
+    for entry in fields(CameraCalibration)
 }
 _MOTION_FIELDS = {"speed_mps": "speed", "yaw_rate_radps": "yawRate"}
 _GPS_FIELDS = {"latitude_deg": "gpsLatitude", "longitude_deg": "gpsLongitude", "heading_deg": "gpsHeading"}
 
 
 def read_file(path: Path) -> bytes:
-    """Read a whole file of at most 256 MiB.
-
-    Raises:
-        InputError: it is missing, cannot be read or is larger.
-    """
+    """Read a whole file of at most 256 MiB."""
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise InputError(f"is larger than {MAX_FILE_BYTES >> 20} MiB", path=path)
@@ -49,28 +41,19 @@ def read_file(path: Path) -> bytes:
 
 
 def read_camera(path: Path) -> CameraCalibration:
-    """Read `*_camera.json`.
-
-    Raises:
-        InputError: it is missing or broken, or a field is missing, not finite or impossible.
-    """
+    """Read `*_camera.json`."""
     content = _read_object(path)
     values = {name: _number(content, path, *place) for name, place in _CAMERA_FIELDS.items()}
     try:
         return CameraCalibration(**values)
     except InputError as error:
         field = error.field or ""
-        raise InputError(
-            str(error).removeprefix(f"{field}: "), path=path, field=".".join(_CAMERA_FIELDS[field])
-        ) from error
+        message = str(error).removeprefix(f"{field}: ")
+        raise InputError(message, path=path, field=".".join(_CAMERA_FIELDS[field])) from error
 
 
 def read_vehicle(path: Path, stamp_ns: int) -> MotionSample:
-    """Read `*_vehicle.json`, which holds for the time of its frame; GPS fields may be absent or null.
-
-    Raises:
-        InputError: it is missing or broken, or a field is missing or not finite.
-    """
+    """Read `*_vehicle.json`, which holds for the time of its frame; GPS fields may be absent or null."""
     content = _read_object(path)
     motion = {name: _number(content, path, field) for name, field in _MOTION_FIELDS.items()}
     given = {name: field for name, field in _GPS_FIELDS.items() if content.get(field) is not None}
@@ -79,11 +62,7 @@ def read_vehicle(path: Path, stamp_ns: int) -> MotionSample:
 
 
 def read_stamp(path: Path) -> int:
-    """Read `*_timestamp.txt`: integer nanoseconds.
-
-    Raises:
-        InputError: it is missing or is not such a number.
-    """
+    """Read `*_timestamp.txt`: integer nanoseconds."""
     text = read_file(path).strip()
     if not text.isdigit() or len(text) > 19 or int(text) > _LAST_STAMP_NS:
         shown = text[:40].decode(errors="replace")
@@ -92,11 +71,7 @@ def read_stamp(path: Path) -> int:
 
 
 def read_picture(path: Path, bit_depth: int, *, gray: bool) -> tuple[bytes, PngHeader]:
-    """Read a PNG file undecoded, with its header.
-
-    Raises:
-        InputError: it is missing or damaged, of another bit depth, or not gray though it must be.
-    """
+    """Read a PNG file of a bit depth undecoded, with its header."""
     data = read_file(path)
     header = read_header(data, path)
     if header.bit_depth != bit_depth or (gray and header.colour_type != GRAY):
@@ -105,11 +80,7 @@ def read_picture(path: Path, bit_depth: int, *, gray: bool) -> tuple[bytes, PngH
 
 
 def read_label(path: Path, *, train_ids: bool) -> tuple[bytes, PngHeader]:
-    """Read a label image as an 8-bit PNG file of label ids, gray or palette; label ids of 8 bits stay undecoded.
-
-    Raises:
-        InputError: it is missing or damaged, or neither gray nor palette of at most 8 bits.
-    """
+    """Read a label image as an 8-bit PNG file of label ids, gray or palette; label ids of 8 bits stay undecoded."""
     data = read_file(path)
     header = read_header(data, path)
     if header.bit_depth == 8 and header.colour_type in (GRAY, PALETTE) and not train_ids:

@@ -10,14 +10,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_files, digest_value
 from semgrid_eval.recording.png import PngHeader
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment, Recording
-from semgrid_eval.sources.cityscapes.files import (
-    read_camera,
-    read_file,
-    read_label,
-    read_picture,
-    read_stamp,
-    read_vehicle,
-)
+from semgrid_eval.sources.cityscapes import files
 
 _CONVERSION_VERSION = 1  # to be raised when the same files give another recording
 
@@ -44,25 +37,15 @@ class SequenceFrame:
 
 @dataclass(frozen=True)
 class CityscapesSequence:
-    """One recording of a Cityscapes tree, found but not read yet.
+    """One recording of a Cityscapes tree, found but not read yet."""
 
-    Args:
-        name: that of its first frame.
-        split: the folder that it is in.
-        city: the folder in that of the split.
-        camera_name: what its camera shall be called in the log.
-        frames: in the order of their numbers.
-        lost: where the image of the first lost frame should be; None where the numbers have no gap.
-        train_ids: whether label images hold train ids instead of label ids.
-    """
-
-    name: str
-    split: str
-    city: str
-    camera_name: str
-    frames: tuple[SequenceFrame, ...]
-    lost: Path | None
-    train_ids: bool
+    name: str  # that of its first frame
+    split: str  # the folder that it is in
+    city: str  # the folder in that of the split
+    camera_name: str  # what its camera shall be called in the log
+    frames: tuple[SequenceFrame, ...]  # in the order of their numbers
+    lost: Path | None  # where the image of the first lost frame should be; None where the numbers have no gap
+    train_ids: bool  # whether label images hold train ids instead of label ids
 
     def digest(self) -> str:
         """Digest the bytes of all files and the options; computed once.
@@ -88,16 +71,16 @@ class CityscapesSequence:
             calibrations={self.camera_name: self._calibration()},
             source_digest=digest,
             moments=lambda: self._moments(stamps_ns),
-            source_files={f"{self.camera_name}_camera.json": read_file(self._camera_files[0])},
+            source_files={f"{self.camera_name}_camera.json": files.read_file(self._camera_files[0])},
         )
 
     @cached_property
     def _digest(self) -> str:
         self._require_files()
         options = [_CONVERSION_VERSION, self.name, self.split, self.camera_name, self.train_ids]
-        files = [[path.name for path in frame.present()] for frame in self.frames]
+        names = [[path.name for path in frame.present()] for frame in self.frames]
         content = digest_files(path for frame in self.frames for path in frame.present())
-        return digest_value([options, files, content])
+        return digest_value([options, names, content])
 
     @property
     def _camera_files(self) -> list[Path]:
@@ -118,14 +101,14 @@ class CityscapesSequence:
 
     def _calibration(self) -> CameraCalibration:
         first, *others = self._camera_files
-        calibration = read_camera(first)
+        calibration = files.read_camera(first)
         for other in others:
-            if read_camera(other) != calibration:
+            if files.read_camera(other) != calibration:
                 raise InputError(f"differs from {first.name}; a sequence has one calibration", path=other)
         return calibration
 
     def _stamps_ns(self) -> list[int]:
-        stamps_ns = [read_stamp(frame.timestamp) for frame in self.frames]
+        stamps_ns = [files.read_stamp(frame.timestamp) for frame in self.frames]
         for frame, (before_ns, now_ns) in zip(self.frames[1:], pairwise(stamps_ns), strict=True):
             if now_ns <= before_ns:
                 raise InputError(f"{now_ns} ns is not after the frame before, {before_ns} ns", path=frame.timestamp)
@@ -134,17 +117,16 @@ class CityscapesSequence:
     def _moments(self, stamps_ns: Sequence[int]) -> Iterator[Moment]:
         first: PngHeader | None = None
         for frame, stamp_ns in zip(self.frames, stamps_ns, strict=True):
-            image, size = read_picture(frame.image, 8, gray=False)
-            disparity, disparity_size = read_picture(frame.disparity, 16, gray=True)
-            first = first or size
+            image, size = files.read_picture(frame.image, 8, gray=False)
+            disparity, disparity_size = files.read_picture(frame.disparity, 16, gray=True)
+            first, label = first or size, None
             _require_size(frame.image, size, first)
             _require_size(frame.disparity, disparity_size, first)
-            label = None
             for path in frame.labels:
-                label, label_size = read_label(path, train_ids=self.train_ids)
+                label, label_size = files.read_label(path, train_ids=self.train_ids)
                 _require_size(path, label_size, first)
             picture = CameraFrame(stamp_ns, image_png=image, disparity_png=disparity, label_png=label)
-            yield Moment(stamp_ns, {self.camera_name: picture}, (read_vehicle(frame.vehicle, stamp_ns),))
+            yield Moment(stamp_ns, {self.camera_name: picture}, (files.read_vehicle(frame.vehicle, stamp_ns),))
 
 
 def frame_name(image: Path) -> str:
@@ -160,7 +142,5 @@ def sibling(image: Path, channel: str, suffix: str) -> Path:
 
 def _require_size(path: Path, header: PngHeader, first: PngHeader) -> None:
     if header[:2] != first[:2]:
-        raise InputError(
-            f"is {header.width} x {header.height}, but the sequence began with {first.width} x {first.height}",
-            path=path,
-        )
+        began = f"{first.width} x {first.height}"
+        raise InputError(f"is {header.width} x {header.height}, but the sequence began with {began}", path=path)

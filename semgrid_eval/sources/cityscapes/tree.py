@@ -38,7 +38,7 @@ _IMAGE_NAME = re.compile(r"(?P<sequence>.+_[0-9]+)_(?P<number>[0-9]+)_leftImg8bi
 def find_sequences(
     src: Path,
     *,
-    splits: Collection[str] | None = None,
+    splits: Collection[str] = (),
     labels: Path | None = None,
     train_ids: bool = False,
     camera_name: str = CAMERA_NAME,
@@ -47,7 +47,7 @@ def find_sequences(
 
     Args:
         src: the folder that holds leftImg8bit_sequence.
-        splits: only these; None takes all.
+        splits: only these; all where none is named.
         labels: a folder of label images, anywhere below it, whose names begin with the frame's; None takes gtFine.
         train_ids: whether label images hold train ids instead of label ids.
         camera_name: what the camera shall be called.
@@ -67,21 +67,18 @@ def find_sequences(
     images = [image for split in _splits(root, splits) for image in sorted((root / split).glob(pattern))]
     runs = list(_runs(images))
     label_files = _LabelFiles(labels, images, train_ids=train_ids)
-    if labels is not None and not label_files.found_any:
-        wanted = f"{frame_name(images[0])}_" if images else "a frame's"
-        raise InputError(f"holds no .png whose name begins with {wanted}", path=labels, field="labels")
     sequences = [_sequence(run, label_files, train_ids=train_ids, camera_name=camera_name) for run in runs]
     if not sequences:
         raise InputError("holds no <split>/<city>/<city>_<sequence>_<number>_leftImg8bit.png", path=root)
     return sorted(sequences, key=lambda sequence: (sequence.split, sequence.name))
 
 
-def _splits(root: Path, wanted: Collection[str] | None) -> list[str]:
+def _splits(root: Path, wanted: Collection[str]) -> list[str]:
     there = sorted(path.name for path in root.iterdir() if path.is_dir())
-    for split in wanted or ():
+    for split in wanted:
         if split not in there:
             raise InputError(f"is not a split of this tree; it has: {', '.join(there)}", path=root, field=split)
-    return there if not wanted else sorted(set(wanted))
+    return sorted(set(wanted)) or there
 
 
 def _runs(images: Iterable[Path]) -> Iterator[list[tuple[int, Path]]]:
@@ -114,28 +111,27 @@ def recording_starts(numbers: Sequence[int]) -> list[int]:
 def _sequence(
     run: list[tuple[int, Path]], label_files: "_LabelFiles", *, train_ids: bool, camera_name: str
 ) -> CityscapesSequence:
-    frames = []
-    for _, image in run:
-        camera = sibling(image, "camera", "_camera.json")
-        frames.append(
-            SequenceFrame(
-                image=image,
-                disparity=sibling(image, "disparity_sequence", "_disparity.png"),
-                vehicle=sibling(image, "vehicle_sequence", "_vehicle.json"),
-                timestamp=sibling(image, "timestamp_sequence", "_timestamp.txt"),
-                camera=camera if camera.is_file() else None,
-                labels=label_files.of(image),
-            )
-        )
     first = run[0][1]
     return CityscapesSequence(
         name=frame_name(first),
         split=first.parent.parent.name,
         city=first.parent.name,
         camera_name=camera_name,
-        frames=tuple(frames),
+        frames=tuple(_frame(image, label_files) for _, image in run),
         lost=_lost_image(run),
         train_ids=train_ids,
+    )
+
+
+def _frame(image: Path, label_files: "_LabelFiles") -> SequenceFrame:
+    camera = sibling(image, "camera", "_camera.json")
+    return SequenceFrame(
+        image=image,
+        disparity=sibling(image, "disparity_sequence", "_disparity.png"),
+        vehicle=sibling(image, "vehicle_sequence", "_vehicle.json"),
+        timestamp=sibling(image, "timestamp_sequence", "_timestamp.txt"),
+        camera=camera if camera.is_file() else None,
+        labels=label_files.of(image),
     )
 
 
@@ -154,7 +150,7 @@ class _LabelFiles:
     Without such a one, any that is named as the other kind is an error: each kind can pass for the other unnoticed.
     """
 
-    def __init__(self, folder: Path | None, images: Iterable[Path], *, train_ids: bool) -> None:
+    def __init__(self, folder: Path | None, images: Sequence[Path], *, train_ids: bool) -> None:
         self._folder = folder
         self._kind, self._other = ("labelTrainIds", "labelids") if train_ids else ("labelIds", "trainids")
         self._advice = "label ids; leave out --train-ids" if train_ids else "train ids; add --train-ids"
@@ -166,11 +162,9 @@ class _LabelFiles:
                 named = [path.name[:end] for end in ends if path.name[:end] in frames]
                 if named:
                     self._found[named[-1]].append(path)
-
-    @property
-    def found_any(self) -> bool:
-        """Whether the folder holds a label image of any frame."""
-        return bool(self._found)
+            if not self._found:
+                wanted = f"{frame_name(images[0])}_" if images else "a frame's"
+                raise InputError(f"holds no .png whose name begins with {wanted}", path=folder, field="labels")
 
     def of(self, image: Path) -> tuple[Path, ...]:
         if self._folder is None:

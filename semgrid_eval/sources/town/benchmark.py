@@ -35,15 +35,14 @@ class SizeOptions(Config):
     size: Annotated[SizeName, Field(description="Full is as large as the paper's data.")] = "small"
 
 
-def convert_benchmark(
-    benchmark: Benchmark, size: SizeName, out: Path, work: Work = IN_PROCESS
-) -> tuple[ConversionSummary, Comparison | None]:
-    """Write the logs of a frozen benchmark and compare them with the published ones, if none failed.
+def convert_town_v1(options: SizeOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
+    """Write the logs of town-v1 and, if none failed, compare them with the published ones.
 
     Raises:
         InputError: SUMO failed, a folder cannot be written to, or a log cannot be read again.
         MissingExtraError: SUMO or Embree is not installed.
     """
+    benchmark, size = load_benchmark("town-v1"), options.size
     summary = convert_town(config_of(benchmark, size), out, work, dataset=benchmark.dataset(size))
     summary.all_splits = True
     comparison = None
@@ -53,26 +52,23 @@ def convert_benchmark(
         with work.stage("compare") as progress:
             found = fingerprints(logs, executor=local_executor(work.workers), progress=progress)
         comparison = compare(benchmark.sizes[size], dict(zip(labels, found, strict=True)))
-    name, made_with = f"{benchmark.name} {size}", benchmark.sizes[size].versions
-    summary.remark = _verdict(name, comparison, len(summary.labels), made_with)
-    return summary, comparison
+    made_with = benchmark.sizes[size].versions
+    summary.remark = _verdict(f"{benchmark.name} {size}", comparison, len(summary.labels), made_with)
+    return summary
 
 
 def config_of(benchmark: Benchmark, size: SizeName) -> SyntheticConfig:
     """Return what `plan_recordings` needs for one size of a benchmark."""
     chosen = benchmark.sizes[size]
     recordings = chosen.train.recordings + chosen.val.recordings
+    same = {name: getattr(benchmark, name) for name in ("width", "height", "stereo", "town_size_m", "duration_s")}
     return SyntheticConfig(
         recordings=recordings,
         seed=chosen.seed,
-        width=benchmark.width,
-        height=benchmark.height,
-        stereo=benchmark.stereo,
         towns=chosen.train.towns + chosen.val.towns,
         val_share=chosen.val.recordings / recordings,
         val_towns=chosen.val.towns,
-        town_size_m=benchmark.town_size_m,
-        duration_s=benchmark.duration_s,
+        **same,
     )
 
 
@@ -104,14 +100,9 @@ def _verdict(name: str, comparison: Comparison | None, total: int, made_with: Ma
     )
 
 
-def _convert_town_v1(options: SizeOptions, out: Path, work: Work) -> ConversionSummary:
-    summary, _ = convert_benchmark(load_benchmark("town-v1"), options.size, out, work)
-    return summary
-
-
 TOWN_V1 = Source(
     options=SizeOptions,
-    convert=_convert_town_v1,
+    convert=convert_town_v1,
     help=_HELP,
     example="semgrid-eval convert town-v1 logs --size small",
     cache=KEPT,

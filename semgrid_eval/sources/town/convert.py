@@ -5,7 +5,8 @@ from pathlib import Path
 
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.sources.source import Source
-from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings, render_recording
+from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
+from semgrid_eval.sources.town.rendering import render_recording
 
 CACHE = ".towns"
 KEPT = f"Folder of towns.  [default: OUT/{CACHE}]"
@@ -22,11 +23,7 @@ def convert_town(
 ) -> ConversionSummary:
     """Simulate towns, draw recordings from them and write their logs; what is there already is kept.
 
-    Args:
-        config: of the data set.
-        out: folder of the logs.
-        work: how it is done; towns are kept in its cache.
-        dataset: the name that the logs carry.
+    Towns are kept in the cache of `work`; the logs carry the name `dataset`.
 
     Raises:
         InputError: SUMO failed, or a folder cannot be written to.

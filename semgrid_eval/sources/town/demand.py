@@ -1,32 +1,39 @@
 """Who travels in a town, and when: SUMO's random trips, thinned out over time so that the streets fill at once."""
 
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from semgrid_eval.sources.town.kinds import TownKind
-from semgrid_eval.sources.town.road_users import ROAD_USERS, RoadUser
+from semgrid_eval.sources.town.road_users import ROAD_USERS
 from semgrid_eval.sources.town.sumo import run_tool
 
 FILL_S = 24.0
 """Time in which the streets are filled; from then on as many depart as arrive."""
 TYPES_FILE = "types.add.xml"
+_FAR = ("--min-distance", "200")
 
 
-@dataclass(frozen=True)
-class _Stream:
-    """Trips over one kind of lane: who may travel it, how many at a time, and how long a trip takes."""
+class _Stream(NamedTuple):
+    """Trips over one kind of lane: SUMO's classes that travel it, how long a trip takes, and options of the tool."""
 
     permission: str
-    users: dict[RoadUser, float]  # how many a kilometre of street
+    classes: tuple[str, ...]
     trip_s: float
     options: tuple[str, ...]
 
     @property
     def file(self) -> str:
         return f"{self.permission}.trips.xml"
+
+
+_STREAMS = (
+    _Stream("passenger", ("passenger", "truck", "bus"), 75.0, _FAR),
+    _Stream("bicycle", ("bicycle",), 90.0, _FAR),
+    _Stream("pedestrian", ("pedestrian",), 170.0, ("--persons",)),
+)
 
 
 def write_demand(network: Path, kind: TownKind, street_km: float, end_s: float, rng: np.random.Generator) -> list[str]:
@@ -36,23 +43,13 @@ def write_demand(network: Path, kind: TownKind, street_km: float, end_s: float, 
         InputError: SUMO's tool failed.
     """
     _write_types(network.parent / TYPES_FILE)
-    streams = _streams(kind)
-    for stream in streams:
-        _write_trips(network, stream, street_km, end_s, rng)
-    return [stream.file for stream in streams]
-
-
-def _streams(kind: TownKind) -> list[_Stream]:
-    densities = {"passenger": kind.cars, "truck": kind.trucks, "bus": kind.buses}
-    densities |= {"bicycle": kind.bicycles, "pedestrian": kind.persons}
-    users = {user: densities[user.sumo_class] * user.share for user in ROAD_USERS}
-    motor = {user: count for user, count in users.items() if user.sumo_class in ("passenger", "truck", "bus")}
-    far = ("--min-distance", "200")
-    streams = [_Stream("passenger", motor, 75.0, far)]
-    for permission, trip_s, options in (("bicycle", 90.0, far), ("pedestrian", 170.0, ("--persons",))):
-        chosen = {user: count for user, count in users.items() if user.sumo_class == permission}
-        streams.append(_Stream(permission, chosen, trip_s, options))
-    return streams
+    density = {"passenger": kind.cars, "truck": kind.trucks, "bus": kind.buses}
+    density |= {"bicycle": kind.bicycles, "pedestrian": kind.persons}
+    for stream in _STREAMS:
+        users = [user for user in ROAD_USERS if user.sumo_class in stream.classes]
+        per_km = {user.name: density[user.sumo_class] * user.share for user in users}
+        _write_trips(network, stream, per_km, street_km, end_s, rng)
+    return [stream.file for stream in _STREAMS]
 
 
 def _write_types(path: Path) -> None:
@@ -64,10 +61,11 @@ def _write_types(path: Path) -> None:
     ET.ElementTree(root).write(path)
 
 
-def _write_trips(network: Path, stream: _Stream, street_km: float, end_s: float, rng: np.random.Generator) -> None:
+def _write_trips(
+    network: Path, stream: _Stream, per_km: dict[str, float], street_km: float, end_s: float, rng: np.random.Generator
+) -> None:
     """Draw trips, then set who makes each and when: enough to fill the streets at once, then as many as arrive."""
-    users = list(stream.users)
-    weights = np.array(list(stream.users.values()))
+    users, weights = list(per_km), np.array(list(per_km.values()))
     at_a_time = max(1, round(float(weights.sum()) * street_km))
     count = at_a_time + round(at_a_time * end_s / stream.trip_s)
     options = ["-n", network.name, "-o", stream.file, "--seed", str(int(rng.integers(1 << 30)))]
@@ -80,7 +78,7 @@ def _write_trips(network: Path, stream: _Stream, street_km: float, end_s: float,
         is_first = index < at_a_time
         late_s = (index - at_a_time) * stream.trip_s / at_a_time
         trip.set("depart", f"{FILL_S * index / at_a_time if is_first else FILL_S + late_s:.2f}")
-        trip.set("type", users[int(rng.choice(len(users), p=weights / weights.sum()))].name)
+        trip.set("type", users[int(rng.choice(len(users), p=weights / weights.sum()))])
         if trip.tag == "person":
             trip.set("departPos", "random")
         else:

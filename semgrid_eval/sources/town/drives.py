@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.sources.town.motion import MAX_YAW_RATE_RADPS, Trajectory, drive
-from semgrid_eval.sources.town.road_users import ROAD_USERS
+from semgrid_eval.sources.town.road_users import CAR_TYPES
 from semgrid_eval.sources.town.traffic import Traffic
 
 FRAME_COUNT = 30
@@ -69,8 +69,7 @@ def choose_drives(traffic: Traffic, count: int, rng: np.random.Generator) -> lis
 
 def _candidates(traffic: Traffic) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.float64]]:
     """Return actor, first step and mean speed of every window of every car, one in five steps."""
-    is_car = np.array([user.sumo_class == "passenger" for user in ROAD_USERS])
-    rows = np.flatnonzero(is_car[traffic.actor_types][traffic.actor])
+    rows = np.flatnonzero(np.isin(traffic.actor_types, CAR_TYPES)[traffic.actor])
     step_of_row = np.repeat(np.arange(len(traffic.times_s)), np.diff(traffic.offsets))
     order = rows[np.lexsort((step_of_row[rows], traffic.actor[rows]))]
     actor, step = np.asarray(traffic.actor[order]), step_of_row[order]

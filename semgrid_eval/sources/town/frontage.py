@@ -8,25 +8,13 @@ import numpy as np
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.sources.town.ground import CELL_M, Ground, Surface
 from semgrid_eval.sources.town.kinds import TownKind
-from semgrid_eval.sources.town.network import Lane, LaneUse, Network
-from semgrid_eval.sources.town.polyline import Polyline
-from semgrid_eval.sources.town.solids import BoxRow, Look, Texture, box
+from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline
+from semgrid_eval.sources.town.solids import BoxRow, Look, Texture, box, colours
 from semgrid_eval.sources.town.trees import Tree, draw_bush, draw_tree
 
 _BUILDING, _WALL, _FENCE, _HEDGE = (LABEL_ID[name] for name in ("building", "wall", "fence", "vegetation"))
 _FLOOR_M = 3.1
-_FACADES = [
-    (176, 158, 132),
-    (150, 92, 74),
-    (196, 188, 172),
-    (132, 126, 120),
-    (188, 166, 112),
-    (122, 82, 70),
-    (164, 150, 142),
-    (206, 198, 182),
-    (142, 134, 108),
-    (108, 110, 116),
-]
+_FACADES = colours("b09e84 965c4a c4bcac 847e78 bca670 7a5246 a4968e cec6b6 8e866c 6c6e74")
 _ROOFS = ((110, 62, 52), (74, 72, 74), (96, 84, 76), (60, 62, 68))
 _TOLERANCE_M = 0.8  # by which houses of a bent row may overlap, and their facades touch the sidewalk
 _OCCUPANCY_STEP = 2  # ground cells a cell of the map of what is taken

@@ -4,8 +4,7 @@ import numpy as np
 
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.sources.town.kinds import TownKind
-from semgrid_eval.sources.town.network import Lane, LaneUse, Network
-from semgrid_eval.sources.town.polyline import Polyline
+from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline
 from semgrid_eval.sources.town.road_users import CAR_TYPES, ROAD_USERS
 from semgrid_eval.sources.town.solids import BoxRow, Texture, box
 from semgrid_eval.sources.town.trees import Tree, draw_tree
@@ -14,6 +13,7 @@ ParkedCar = tuple[int, float, float, float]  # type index, x, y, yaw
 _POLE, _SIGN, _LIGHT = LABEL_ID["pole"], LABEL_ID["traffic sign"], LABEL_ID["traffic light"]
 _BICYCLE = LABEL_ID["bicycle"]
 _GREY, _WHITE, _BLACK = (112, 114, 116), (210, 210, 206), (30, 32, 34)
+_METAL = (_POLE, Texture.PLAIN, _GREY)
 _SIGN_COLOURS = ((196, 38, 34), (36, 74, 158), (228, 196, 60), (210, 210, 206))
 _CURB_M = 0.55  # from the curb to the middle of what stands on the sidewalk
 _CLEAR_OF_JUNCTION_M = 7.0
@@ -63,14 +63,10 @@ def _lamps(lane: Lane, rng: np.random.Generator) -> list[BoxRow]:
     boxes: list[BoxRow] = []
     height_m = float(rng.uniform(5.0, 8.5))
     for s_m in np.arange(float(rng.uniform(5.0, 14.0)), line.length_m - 3.0, float(rng.uniform(22.0, 32.0))):
-        x_m, y_m, yaw_rad = line.at(float(s_m), _curb(lane))
-        boxes.append(
-            box((x_m, y_m, yaw_rad), (0.0, height_m), (0.2, 0.2), (_POLE, Texture.PLAIN, _GREY), top_size_m=(0.1, 0.1))
-        )
-        arm_x, arm_y, _ = line.at(float(s_m), _curb(lane) + 0.7)
-        boxes.append(
-            box((arm_x, arm_y, yaw_rad), (height_m - 0.1, height_m + 0.1), (0.3, 1.5), (_POLE, Texture.PLAIN, _GREY))
-        )
+        place = line.at(float(s_m), _curb(lane))
+        boxes.append(box(place, (0.0, height_m), (0.2, 0.2), _METAL, top_size_m=(0.1, 0.1)))
+        arm = (*line.at(float(s_m), _curb(lane) + 0.7)[:2], place[2])
+        boxes.append(box(arm, (height_m - 0.1, height_m + 0.1), (0.3, 1.5), _METAL))
     return boxes
 
 
@@ -83,7 +79,7 @@ def _signs(lane: Lane, rng: np.random.Generator) -> list[BoxRow]:
         height_m = float(rng.uniform(2.2, 2.8))
         side_m = float(rng.uniform(0.5, 0.8))
         colour = _SIGN_COLOURS[int(rng.integers(len(_SIGN_COLOURS)))]
-        boxes.append(box(place, (0.0, height_m), (0.09, 0.09), (_POLE, Texture.PLAIN, _GREY)))
+        boxes.append(box(place, (0.0, height_m), (0.09, 0.09), _METAL))
         boxes.append(box(place, (height_m - side_m, height_m + 0.05), (0.12, side_m), (_SIGN, Texture.PLAIN, colour)))
         s_m += float(rng.uniform(10.0, 34.0))
     return boxes
@@ -115,12 +111,9 @@ def _bicycle(place: tuple[float, float, float], rng: np.random.Generator) -> lis
     x_m, y_m, yaw_rad = place
     frame = (_BICYCLE, Texture.PLAIN, _SIGN_COLOURS[int(rng.integers(len(_SIGN_COLOURS)))])
     dark = (_BICYCLE, Texture.PLAIN, _BLACK)
-    parts = [
-        (0.52, (0.0, 0.66), (0.62, 0.06), dark),
-        (-0.52, (0.0, 0.66), (0.62, 0.06), dark),
-        (0.0, (0.4, 0.7), (0.95, 0.08), frame),
-        (0.42, (0.9, 1.02), (0.08, 0.5), dark),
-    ]
+    wheel = ((0.0, 0.66), (0.62, 0.06), dark)
+    parts = [(0.52, *wheel), (-0.52, *wheel), (0.0, (0.4, 0.7), (0.95, 0.08), frame)]
+    parts.append((0.42, (0.9, 1.02), (0.08, 0.5), dark))
     cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
     return [
         box((x_m + cos * along, y_m + sin * along, yaw_rad), heights, size, look)
@@ -134,7 +127,7 @@ def _traffic_light(lane: Lane) -> list[BoxRow]:
     x_m, y_m, yaw_rad = line.at(line.length_m - 0.5, _curb(lane) + 0.15)
     head_x, head_y = x_m - 0.2 * np.cos(yaw_rad), y_m - 0.2 * np.sin(yaw_rad)
     return [
-        box((x_m, y_m, yaw_rad), (0.0, 3.4), (0.15, 0.15), (_POLE, Texture.PLAIN, _GREY)),
+        box((x_m, y_m, yaw_rad), (0.0, 3.4), (0.15, 0.15), _METAL),
         box((head_x, head_y, yaw_rad), (2.4, 3.4), (0.25, 0.36), (_LIGHT, Texture.PLAIN, _BLACK)),
         box((x_m, y_m, yaw_rad), (0.95, 1.15), (0.2, 0.2), (_POLE, Texture.PLAIN, (190, 160, 40))),
     ]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import LABEL_ID
-from semgrid_eval.sources.town.network import Lane, LaneUse, Network
-from semgrid_eval.sources.town.polyline import Polyline
+from semgrid_eval.geometry import Floats
+from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline
 
 CELL_M = 0.2
 MARGIN_M = 120.0
@@ -32,23 +32,14 @@ class Surface(IntEnum):
     PARKING = 6
 
 
-_LABELS = {
-    Surface.TERRAIN: "terrain",
-    Surface.ROAD: "road",
-    Surface.MARKING: "road",
-    Surface.SIDEWALK: "sidewalk",
-    Surface.CROSSING: "road",
-    Surface.BICYCLE_LANE: "road",
-    Surface.PARKING: "road",
-}
-_COLOURS = {
-    Surface.TERRAIN: (92, 108, 62),
-    Surface.ROAD: (92, 92, 94),
-    Surface.MARKING: (205, 205, 200),
-    Surface.SIDEWALK: (146, 140, 134),
-    Surface.CROSSING: (200, 200, 196),
-    Surface.BICYCLE_LANE: (112, 78, 72),
-    Surface.PARKING: (104, 102, 102),
+_LOOKS = {
+    Surface.TERRAIN: ("terrain", (92, 108, 62)),
+    Surface.ROAD: ("road", (92, 92, 94)),
+    Surface.MARKING: ("road", (205, 205, 200)),
+    Surface.SIDEWALK: ("sidewalk", (146, 140, 134)),
+    Surface.CROSSING: ("road", (200, 200, 196)),
+    Surface.BICYCLE_LANE: ("road", (112, 78, 72)),
+    Surface.PARKING: ("road", (104, 102, 102)),
 }
 _LANE_SURFACES = {  # in the order of drawing
     LaneUse.PARKING: Surface.PARKING,
@@ -56,23 +47,17 @@ _LANE_SURFACES = {  # in the order of drawing
     LaneUse.CAR: Surface.ROAD,
     LaneUse.SIDEWALK: Surface.SIDEWALK,
 }
-SURFACE_LABELS = np.array([LABEL_ID[_LABELS[surface]] for surface in Surface], np.uint8)
-SURFACE_COLOURS = np.array([_COLOURS[surface] for surface in Surface], np.uint8)
+SURFACE_LABELS = np.array([LABEL_ID[_LOOKS[surface][0]] for surface in Surface], np.uint8)
+SURFACE_COLOURS = np.array([_LOOKS[surface][1] for surface in Surface], np.uint8)
 
 
 @dataclass(frozen=True)
 class Ground:
-    """Surfaces (H, W) of cells of `CELL_M`; row 0 is southernmost, column 0 westernmost, beyond them is terrain.
+    """Surfaces (H, W) of cells of `CELL_M`; row 0 is southernmost, column 0 westernmost, beyond them is terrain."""
 
-    Args:
-        surface: values of `Surface`.
-        west_m: x of the western edge in the map frame.
-        south_m: y of the southern edge in the map frame.
-    """
-
-    surface: NDArray[np.uint8]
-    west_m: float
-    south_m: float
+    surface: NDArray[np.uint8]  # values of `Surface`
+    west_m: float  # x of the western edge in the map frame
+    south_m: float  # y of the southern edge in the map frame
 
     def at(self, x_m: NDArray[np.floating], y_m: NDArray[np.floating]) -> NDArray[np.uint8]:
         """Return the surfaces at points of any shape in the map frame."""
@@ -106,11 +91,11 @@ class GroundPainter:
         height = int((north_m + MARGIN_M - self._south_m) / CELL_M)
         self._surface = np.full((height, width), Surface.TERRAIN, np.uint8)
 
-    def polygon(self, points_m: NDArray[np.float64], surface: Surface) -> None:
+    def polygon(self, points_m: Floats, surface: Surface) -> None:
         """Fill a polygon (N, 2)."""
         cv2.fillPoly(self._surface, [self._fixed_point(points_m)], int(surface), cv2.LINE_8, _SHIFT_BITS)
 
-    def line(self, points_m: NDArray[np.float64], width_m: float, surface: Surface) -> None:
+    def line(self, points_m: Floats, width_m: float, surface: Surface) -> None:
         """Draw a line (N, 2) of some width; like all shapes it covers every cell that it touches."""
         for start, end in pairwise(points_m):
             length = np.linalg.norm(end - start)
@@ -123,7 +108,7 @@ class GroundPainter:
         """Return the ground as drawn so far."""
         return Ground(self._surface, self._west_m, self._south_m)
 
-    def _fixed_point(self, points_m: NDArray[np.float64]) -> NDArray[np.int32]:
+    def _fixed_point(self, points_m: Floats) -> NDArray[np.int32]:
         """Return points in cells, where whole numbers are cell centres, as OpenCV's fixed-point numbers."""
         cells = (points_m - (self._west_m, self._south_m)) / CELL_M - 0.5
         return np.round(cells * (1 << _SHIFT_BITS)).astype(np.int32)
@@ -156,7 +141,7 @@ def _paint_markings(lane: Lane, painter: GroundPainter) -> None:
         painter.line(np.array(ends), 0.3, Surface.MARKING)
 
 
-def _paint_crossing(line_m: NDArray[np.float64], width_m: float, painter: GroundPainter) -> None:
+def _paint_crossing(line_m: Floats, width_m: float, painter: GroundPainter) -> None:
     """Draw the stripes of a crossing over the road that it crosses."""
     line = Polyline.through(line_m)
     for start_m in np.arange(0.3, line.length_m - _STRIPE_M, _STRIPE_PERIOD_M):

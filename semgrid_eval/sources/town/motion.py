@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from semgrid_eval.geometry import Floats
 
 FRONT_TO_REAR_AXLE_M = 3.8
 SMOOTHING_S = 0.25
@@ -14,21 +15,13 @@ _MAX_STEP_M = 1.2  # 20 m/s at 17 Hz; what goes farther was moved by SUMO, not d
 
 @dataclass(frozen=True)
 class Trajectory:
-    """The rear axle's path on the clock of the simulation.
+    """The rear axle's path on the clock of the simulation."""
 
-    Args:
-        times_s: (S,).
-        position_m: (S, 2) in the map frame.
-        yaw_rad: (S,) continuous.
-        speed_mps: (S,) along the heading.
-        yaw_rate_radps: (S,) left-positive.
-    """
-
-    times_s: NDArray[np.float64]
-    position_m: NDArray[np.float64]
-    yaw_rad: NDArray[np.float64]
-    speed_mps: NDArray[np.float64]
-    yaw_rate_radps: NDArray[np.float64]
+    times_s: Floats  # (S,)
+    position_m: Floats  # (S, 2) in the map frame
+    yaw_rad: Floats  # (S,) continuous
+    speed_mps: Floats  # (S,) along the heading
+    yaw_rate_radps: Floats  # (S,) left-positive
 
     def at(self, time_s: float) -> tuple[float, float, float, float, float]:
         """Interpolate x, y, yaw, speed and yaw rate."""
@@ -41,38 +34,24 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class MotionNoise:
-    """Errors of the reported motion: constant for a recording, white for a sample, and how old a value is.
+    """Errors of the reported motion: constant for a recording, white for a sample, and how old a value is."""
 
-    Args:
-        speed_scale: standard deviation of the wheel circumference's relative error.
-        speed_mps: standard deviation of each reported speed.
-        yaw_rate_bias_radps: standard deviation of the gyroscope's offset.
-        yaw_rate_radps: standard deviation of each reported yaw rate.
-        latency_s: by which reports lag behind.
-    """
-
-    speed_scale: float = 0.004
-    speed_mps: float = 0.02
-    yaw_rate_bias_radps: float = 0.0008
-    yaw_rate_radps: float = 0.0025
-    latency_s: float = 0.02
+    speed_scale: float = 0.004  # standard deviation of the wheel circumference's relative error
+    speed_mps: float = 0.02  # standard deviation of each reported speed
+    yaw_rate_bias_radps: float = 0.0008  # standard deviation of the gyroscope's offset
+    yaw_rate_radps: float = 0.0025  # standard deviation of each reported yaw rate
+    latency_s: float = 0.02  # by which reports lag behind
 
 
 EXACT_MOTION = MotionNoise(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def drive(
-    times_s: NDArray[np.float64], front_m: NDArray[np.float64], heading_rad: NDArray[np.float64]
-) -> Trajectory | None:
+def drive(times_s: Floats, front_m: Floats, heading_rad: Floats) -> Trajectory | None:
     """Turn a front bumper's track into the path of the rear axle, or None where the track jumps or breaks off.
 
     The track is smoothed, then the rear axle follows it as a wheel does: it always moves along the vehicle's heading,
-    so that speed and yaw rate integrate to the path.
-
-    Args:
-        times_s: (S,) evenly spaced.
-        front_m: (S, 2) middle of the front bumper, NaN where the vehicle is not there.
-        heading_rad: (S,) heading as SUMO gives it; only the first is used.
+    so that speed and yaw rate integrate to the path. The track is the middle of the front bumper (S, 2) at evenly
+    spaced times, NaN where the vehicle is not there; of SUMO's headings (S,) only the first is used.
     """
     if np.isnan(front_m).any() or np.linalg.norm(np.diff(front_m, axis=0), axis=1).max() > _MAX_STEP_M:
         return None
@@ -85,9 +64,7 @@ def drive(
     return Trajectory(times_s, rear, yaw, speed, np.gradient(yaw, step_s))
 
 
-def report(
-    path: Trajectory, times_s: NDArray[np.float64], noise: MotionNoise, rng: np.random.Generator
-) -> NDArray[np.float64]:
+def report(path: Trajectory, times_s: Floats, noise: MotionNoise, rng: np.random.Generator) -> Floats:
     """Return what the vehicle reports at some times: (N, 2) speed and yaw rate."""
     seen_s = times_s - noise.latency_s
     speed = np.interp(seen_s, path.times_s, path.speed_mps) * (1.0 + noise.speed_scale * rng.standard_normal())
@@ -97,7 +74,7 @@ def report(
     return np.stack([np.where(moving, speed + errors[:, 0], 0.0), yaw_rate + errors[:, 1]], axis=1)
 
 
-def _followed_yaw(front_m: NDArray[np.float64], yaw_rad: float) -> NDArray[np.float64]:
+def _followed_yaw(front_m: Floats, yaw_rad: float) -> Floats:
     """Return the heading (S,) of a vehicle whose front is led along points (S, 2) and whose rear axle follows.
 
     Along a straight step s the angle phi between heading and step shrinks as tan(phi / 2) exp(-s / L): the tractrix.
@@ -111,7 +88,7 @@ def _followed_yaw(front_m: NDArray[np.float64], yaw_rad: float) -> NDArray[np.fl
     return np.array(yaws)
 
 
-def _smoothed(points: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
+def _smoothed(points: Floats, sigma: float) -> Floats:
     """Smooth points (S, 2) by a Gaussian of `sigma` samples; the ends are continued in a straight line."""
     reach = int(np.ceil(3.0 * sigma))
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)

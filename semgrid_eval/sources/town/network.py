@@ -1,14 +1,15 @@
-"""Reads a SUMO network into the shapes that a scene is built from: lanes, junctions, walking areas, crossings."""
+"""The shapes that a scene is built from, as SUMO's network has them: lanes, junctions, walking areas, crossings."""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.geometry import Floats
 
 _DEFAULT_WIDTH_M = 3.2
 
@@ -22,13 +23,50 @@ class LaneUse(Enum):
     CAR = "car"
 
 
+_USES = {"pedestrian": LaneUse.SIDEWALK, "bicycle": LaneUse.BICYCLE}
+
+
+@dataclass(frozen=True)
+class Polyline:
+    """A line through points (N, 2); distances along it run from 0 to `length_m`."""
+
+    points_m: Floats
+    distances_m: Floats
+
+    @classmethod
+    def through(cls, points_m: Floats) -> "Polyline":
+        """Return the line through points (N, 2); repeated points are left out."""
+        steps = np.linalg.norm(np.diff(points_m, axis=0), axis=1)
+        keep = np.append(True, steps > 1e-6)
+        kept = points_m[keep]
+        return cls(kept, np.append(0.0, np.cumsum(np.linalg.norm(np.diff(kept, axis=0), axis=1))))
+
+    @property
+    def length_m(self) -> float:
+        """Length of the line."""
+        return float(self.distances_m[-1])
+
+    def at(self, distance_m: float, left_m: float = 0.0) -> tuple[float, float, float]:
+        """Return x, y and yaw at a distance along the line and an offset to its left."""
+        segment = int(np.clip(np.searchsorted(self.distances_m, distance_m, "right") - 1, 0, len(self.points_m) - 2))
+        start, end = self.points_m[segment], self.points_m[segment + 1]
+        ahead = (end - start) / np.linalg.norm(end - start)
+        x_m, y_m = start + (distance_m - self.distances_m[segment]) * ahead + left_m * np.array([-ahead[1], ahead[0]])
+        return float(x_m), float(y_m), float(np.arctan2(ahead[1], ahead[0]))
+
+    def piece(self, start_m: float, end_m: float, left_m: float = 0.0) -> Floats:
+        """Return the points (M, 2) of the line between two distances, moved to its left."""
+        inside = self.distances_m[(self.distances_m > start_m) & (self.distances_m < end_m)]
+        return np.array([self.at(float(s), left_m)[:2] for s in (start_m, *inside, end_m)])
+
+
 @dataclass(frozen=True)
 class Lane:
     """A lane in driving direction: centre line (N, 2) in the map frame, and the street direction it belongs to."""
 
     use: LaneUse
     edge: str
-    line_m: NDArray[np.float64]
+    line_m: Floats
     width_m: float
     ends_at_light: bool
 
@@ -38,9 +76,9 @@ class Network:
     """The shapes of a town; polygons and lines are (N, 2) in the map frame (x east, y north)."""
 
     lanes: tuple[Lane, ...]
-    junctions_m: tuple[NDArray[np.float64], ...]
-    walking_areas_m: tuple[NDArray[np.float64], ...]
-    crossings: tuple[tuple[NDArray[np.float64], float], ...]  # centre line, width
+    junctions_m: tuple[Floats, ...]
+    walking_areas_m: tuple[Floats, ...]
+    crossings: tuple[tuple[Floats, float], ...]  # centre line, width
 
     def bounds_m(self) -> tuple[float, float, float, float]:
         """Return least x, least y, most x, most y of all lanes and junctions."""
@@ -63,17 +101,11 @@ def read_network(path: Path) -> Network:
     root = ET.parse(path).getroot()
     junctions = [node for node in root.iter("junction") if node.get("type") != "internal" and node.get("shape")]
     lights = {node.attrib["id"] for node in junctions if node.get("type") == "traffic_light"}
-    edges = list(root.iter("edge"))
-    lanes = tuple(
-        _lane(lane, edge, ends_at_light=edge.get("to") in lights)
-        for edge in edges
-        if edge.get("function") is None
-        for lane in edge.iter("lane")
-    )
+    lanes = tuple(_lane(lane, edge, ends_at_light=edge.get("to") in lights) for edge, lane in _lanes(root, None))
     if not lanes:
         raise InputError("the town is empty: SUMO kept no street", path=path)
-    crossings = (lane for edge in edges if edge.get("function") == "crossing" for lane in edge.iter("lane"))
-    walking = (lane for edge in edges if edge.get("function") == "walkingarea" for lane in edge.iter("lane"))
+    crossings = (lane for _, lane in _lanes(root, "crossing"))
+    walking = (lane for _, lane in _lanes(root, "walkingarea"))
     return Network(
         lanes=lanes,
         junctions_m=tuple(_points(node) for node in junctions if len(_points(node)) >= 3),
@@ -82,20 +114,19 @@ def read_network(path: Path) -> Network:
     )
 
 
-def _points(element: ET.Element) -> NDArray[np.float64]:
+def _lanes(root: ET.Element, function: str | None) -> Iterator[tuple[ET.Element, ET.Element]]:
+    """Find the edges of a function, None for streets, and their lanes."""
+    for edge in root.iter("edge"):
+        if edge.get("function") == function:
+            yield from ((edge, lane) for lane in edge.iter("lane"))
+
+
+def _points(element: ET.Element) -> Floats:
     """Return the shape (N, 2); heights, where SUMO writes them, are dropped."""
     return np.array([[float(value) for value in point.split(",")[:2]] for point in element.attrib["shape"].split()])
 
 
 def _lane(lane: ET.Element, edge: ET.Element, *, ends_at_light: bool) -> Lane:
-    allow, disallow = lane.get("allow"), lane.get("disallow")
-    if disallow == "all":
-        use = LaneUse.PARKING
-    elif allow == "pedestrian":
-        use = LaneUse.SIDEWALK
-    elif allow == "bicycle":
-        use = LaneUse.BICYCLE
-    else:
-        use = LaneUse.CAR
+    use = LaneUse.PARKING if lane.get("disallow") == "all" else _USES.get(lane.get("allow", ""), LaneUse.CAR)
     width_m = float(lane.get("width", _DEFAULT_WIDTH_M))
     return Lane(use, edge.attrib["id"], _points(lane), width_m, ends_at_light)

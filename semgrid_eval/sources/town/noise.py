@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import LABEL_ID
 
+Float32s = NDArray[np.float32]
+Labels = NDArray[np.uint8]
 FULL_WIDTH_PX = 2048
 _LABEL_WIDTH_PX = 512
 # Smoothness of: displacement right, down; bad borders; confusion; mistakes.
@@ -38,62 +40,35 @@ _MISTAKES = {
 
 @dataclass(frozen=True)
 class DisparityNoise:
-    """Errors of disparity; standard deviations are in pixels of a 2048 pixel wide image.
+    """Errors of disparity; standard deviations are in pixels of a 2048 pixel wide image."""
 
-    Args:
-        correlated_px: smooth over `correlation` of the image's width, new in each frame.
-        slow_px: likewise smooth, but carried from frame to frame with `persistence`.
-        white_px: of each pixel for itself.
-        correlation: standard deviation of the smoothing kernel as a share of the width.
-        persistence: share of the slow error, and of where mismatches are, that the next frame keeps.
-        mismatched: share of the image in patches that were matched to something else.
-        mismatch_px: standard deviation of the error there.
-        dropout: share of patches without disparity near the camera, and ...
-        far_dropout: ... at an infinite distance, where a matching window holds more borders.
-        dropout_persistence: share of where dropouts are that the next frame keeps.
-        speckle: share of single pixels without disparity.
-        fattened: share of the borders at which the foreground spreads over the background.
-        sky: share of the sky that has a wrong, small disparity.
-    """
-
-    correlated_px: float = 0.28
-    slow_px: float = 0.26
-    white_px: float = 0.25
-    correlation: float = 0.012
-    persistence: float = 0.9
-    mismatched: float = 0.010
-    mismatch_px: float = 6.0
-    dropout: float = 0.04
-    far_dropout: float = 0.18
-    dropout_persistence: float = 0.7
-    speckle: float = 0.015
-    fattened: float = 0.6
-    sky: float = 0.45
+    correlated_px: float = 0.28  # smooth over `correlation` of the image's width, new in each frame
+    slow_px: float = 0.26  # likewise smooth, but carried from frame to frame with `persistence`
+    white_px: float = 0.25  # of each pixel for itself
+    correlation: float = 0.012  # standard deviation of the smoothing kernel as a share of the width
+    persistence: float = 0.9  # share of the slow error, and of where mismatches are, that the next frame keeps
+    mismatched: float = 0.010  # share of the image in patches that were matched to something else
+    mismatch_px: float = 6.0  # standard deviation of the error there
+    dropout: float = 0.04  # share of patches without disparity near the camera, and ...
+    far_dropout: float = 0.18  # ... at an infinite distance, where a matching window holds more borders
+    dropout_persistence: float = 0.7  # share of where dropouts are that the next frame keeps
+    speckle: float = 0.015  # share of single pixels without disparity
+    fattened: float = 0.6  # share of the borders at which the foreground spreads over the background
+    sky: float = 0.45  # share of the sky that has a wrong, small disparity
 
 
 @dataclass(frozen=True)
 class LabelNoise:
-    """Errors of labels; lengths are in pixels of a 512 pixel wide image.
+    """Errors of labels; lengths are in pixels of a 512 pixel wide image."""
 
-    Args:
-        warp_px: standard deviation of the borders' displacement.
-        border_px: how far from the true place a border may be in a bad patch.
-        bad_borders: share of the image in such patches.
-        confused_px: how far the labels of a patch of confusion may be from their true place.
-        confused: share of the image in such patches.
-        mistaken: factor on the shares of `_MISTAKES`, patches that get another label as a whole.
-        persistence: share of the borders' error fields that the next frame keeps; the rest flickers.
-        mistakes_persistence: likewise, of the patches with another label.
-    """
-
-    warp_px: float = 0.35
-    border_px: float = 2.0
-    bad_borders: float = 0.10
-    confused_px: float = 8.0
-    confused: float = 0.004
-    mistaken: float = 0.5
-    persistence: float = 0.7
-    mistakes_persistence: float = 0.9
+    warp_px: float = 0.35  # standard deviation of the borders' displacement
+    border_px: float = 2.0  # how far from the true place a border may be in a bad patch
+    bad_borders: float = 0.10  # share of the image in such patches
+    confused_px: float = 8.0  # how far the labels of a patch of confusion may be from their true place
+    confused: float = 0.004  # share of the image in such patches
+    mistaken: float = 0.5  # factor on the shares of `_MISTAKES`, patches that get another label as a whole
+    persistence: float = 0.7  # share of the borders' error fields that the next frame keeps; the rest flickers
+    mistakes_persistence: float = 0.9  # likewise, of the patches with another label
 
 
 class DisparityErrors:
@@ -102,11 +77,11 @@ class DisparityErrors:
     def __init__(self, noise: DisparityNoise, rng: np.random.Generator) -> None:
         self._noise = noise
         self._rng = rng
-        self._slow: NDArray[np.float32] | None = None
-        self._mismatch: NDArray[np.float32] | None = None
-        self._dropout: NDArray[np.float32] | None = None
+        self._slow: Float32s | None = None
+        self._mismatch: Float32s | None = None
+        self._dropout: Float32s | None = None
 
-    def add(self, exact_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    def add(self, exact_px: Float32s) -> Float32s:
         """Return the next frame's disparity (H, W) with errors, in pixels of its own width."""
         noise, rng, shape = self._noise, self._rng, exact_px.shape
         sigma = noise.correlation * shape[1]
@@ -124,14 +99,14 @@ class DisparityErrors:
         _match_sky(noisy, exact_px, noise.sky, rng)
         return np.maximum(noisy, 0.0)
 
-    def _mismatch_px(self, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    def _mismatch_px(self, shape: tuple[int, ...]) -> Float32s:
         """Return the error (H, W) of patches that were matched to something else, 0 around them."""
         noise, sigma = self._noise, 0.008 * shape[1]
         self._mismatch = _carried(self._mismatch, _smooth_field(shape, sigma, self._rng), noise.persistence)
         error_px = np.float32(noise.mismatch_px) * _smooth_field(shape, 2.0 * sigma, self._rng)
         return np.where(self._mismatch > _threshold(noise.mismatched), error_px, np.float32(0.0))
 
-    def _dropout_threshold(self, disparity_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _dropout_threshold(self, disparity_px: Float32s) -> Float32s:
         """Return what a Gaussian field exceeds (H, W) on the share of dropouts at each pixel's range."""
         near, far = _threshold(self._noise.dropout), _threshold(self._noise.far_dropout)
         middle_px = np.float32(_MIDDLE_PX * disparity_px.shape[1] / FULL_WIDTH_PX)
@@ -144,11 +119,11 @@ class LabelErrors:
     def __init__(self, noise: LabelNoise, rng: np.random.Generator) -> None:
         self._noise = noise
         self._rng = rng
-        self._fields: list[NDArray[np.float32] | None] = [None] * len(_LABEL_FIELDS_PX)
+        self._fields: list[Float32s | None] = [None] * len(_LABEL_FIELDS_PX)
         self._kept = (*[noise.persistence] * (len(_LABEL_FIELDS_PX) - 1), noise.mistakes_persistence)
         self._mistakes = _mistake_tables(noise.mistaken)
 
-    def add(self, exact: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def add(self, exact: Labels) -> Labels:
         """Return the next frame's labels (H, W) with errors."""
         noise, scale = self._noise, exact.shape[1] / _LABEL_WIDTH_PX
         fresh = [_smooth_field(exact.shape, sigma_px * scale, self._rng) for sigma_px in _LABEL_FIELDS_PX]
@@ -167,7 +142,7 @@ class LabelErrors:
         return np.where(mistake > rare, high[bent], np.where(mistake < -rare, low[bent], bent))
 
 
-def _mistake_tables(factor: float) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.uint8]]:
+def _mistake_tables(factor: float) -> tuple[Float32s, Labels, Labels]:
     """Return tables (256,) by label: beyond what value of a field it is mistaken, and for what above and below."""
     limit, high = np.full(256, np.inf, np.float32), np.arange(256, dtype=np.uint8)
     low = high.copy()
@@ -177,14 +152,14 @@ def _mistake_tables(factor: float) -> tuple[NDArray[np.float32], NDArray[np.uint
     return limit, high, low
 
 
-def _carried(old: NDArray[np.float32] | None, fresh: NDArray[np.float32], persistence: float) -> NDArray[np.float32]:
+def _carried(old: Float32s | None, fresh: Float32s, persistence: float) -> Float32s:
     """Return the next field of an autoregressive sequence whose variance stays what it is."""
     if old is None:
         return fresh
     return np.float32(persistence) * old + np.float32((1.0 - persistence**2) ** 0.5) * fresh
 
 
-def _smooth_field(shape: tuple[int, ...], sigma: float, rng: np.random.Generator) -> NDArray[np.float32]:
+def _smooth_field(shape: tuple[int, ...], sigma: float, rng: np.random.Generator) -> Float32s:
     """Return a Gaussian field (H, W) of unit variance, smooth over `sigma` pixels.
 
     It is drawn on a coarser lattice and interpolated, which costs a fraction of blurring at full size.
@@ -204,7 +179,7 @@ def _threshold(share: float) -> float:
     return NormalDist().inv_cdf(1.0 - share) if share > 0.0 else _NEVER
 
 
-def _fattened(disparity_px: NDArray[np.float32], share: float, rng: np.random.Generator) -> NDArray[np.float32]:
+def _fattened(disparity_px: Float32s, share: float, rng: np.random.Generator) -> Float32s:
     """Let the foreground spread over its border by half a matching window, in patches."""
     scale = disparity_px.shape[1] / 512
     kernel = np.ones((2 * round(scale) + 1, 4 * round(scale) + 1), np.uint8)
@@ -214,16 +189,14 @@ def _fattened(disparity_px: NDArray[np.float32], share: float, rng: np.random.Ge
     return np.where(patches & is_border, spread, disparity_px)
 
 
-def _is_occluded(disparity_px: NDArray[np.float32]) -> NDArray[np.bool_]:
+def _is_occluded(disparity_px: Float32s) -> NDArray[np.bool_]:
     """Return which points (H, W) of the left image something nearer hides from the right camera."""
     column_right = np.arange(disparity_px.shape[1], dtype=np.float32) - disparity_px
     nearest = np.minimum.accumulate(column_right[:, ::-1], axis=1)[:, ::-1]
     return nearest < column_right - np.float32(0.5)
 
 
-def _match_sky(
-    noisy_px: NDArray[np.float32], exact_px: NDArray[np.float32], share: float, rng: np.random.Generator
-) -> None:
+def _match_sky(noisy_px: Float32s, exact_px: Float32s, share: float, rng: np.random.Generator) -> None:
     """Set a small disparity in patches of the sky, as matching does where there is nothing to match."""
     shape = exact_px.shape
     patches = (exact_px <= 0.0) & (_smooth_field(shape, 0.01 * shape[1], rng) > _threshold(share))

@@ -15,15 +15,16 @@ from semgrid_eval.progress import Progress
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town.drives import choose_drives
 from semgrid_eval.sources.town.kinds import KINDS
-from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
+from semgrid_eval.sources.town.rendering import RecordingPlan
 from semgrid_eval.sources.town.town import TownSpec, load_town, prepare_town
-
-__all__ = ["RecordingPlan", "SyntheticConfig", "plan_recordings", "render_recording"]
 
 _STEREO = (
     "Errors of labels, disparity and motion: drawn from a model; or disparity from matching a rendered stereo pair; "
     "or none."
 )
+_VAL_TOWNS = "Towns for validation, if it is another share than of the recordings."
+_TOWN_SIZE = "Side of the square that streets cover."
+_DURATION = "Simulated time of a town from which recordings are taken."
 _POSITIONS_PER_KM2_S = 25_000
 _MAX_POSITIONS = 10_000_000  # of everybody in a town at every step; they are held in memory, some 200 bytes each
 
@@ -35,15 +36,9 @@ class SyntheticConfig(Config):
     seed: Annotated[int, Field(ge=0, lt=1 << 31, description="The same seed gives the same bytes.")] = 0
     towns: Annotated[int, Field(ge=1, le=100, description="How many; each belongs to one split only.")] = 4
     val_share: Annotated[float, Field(ge=0.0, lt=1.0, description="Of recordings and of towns, for validation.")] = 0.3
-    val_towns: Annotated[
-        int | None, Field(ge=1, description="Towns for validation, if it is another share than of the recordings.")
-    ] = None
-    town_size_m: Annotated[float, Field(ge=250.0, le=2000.0, description="Side of the square that streets cover.")] = (
-        450.0
-    )
-    duration_s: Annotated[
-        float, Field(ge=10.0, le=3600.0, description="Simulated time of a town from which recordings are taken.")
-    ] = 90.0
+    val_towns: Annotated[int | None, Field(ge=1, description=_VAL_TOWNS)] = None
+    town_size_m: Annotated[float, Field(ge=250.0, le=2000.0, description=_TOWN_SIZE)] = 450.0
+    duration_s: Annotated[float, Field(ge=10.0, le=3600.0, description=_DURATION)] = 90.0
     width: Annotated[int, Field(ge=64, le=4096, description="Of the images in pixels.")] = 512
     height: Annotated[int, Field(ge=32, le=2048, description="Of the images in pixels.")] = 256
     stereo: Annotated[Stereo, Field(description=_STEREO)] = "modelled"
@@ -61,9 +56,8 @@ class SyntheticConfig(Config):
         positions = _POSITIONS_PER_KM2_S * (self.town_size_m / 1000.0) ** 2 * self.duration_s
         if positions > _MAX_POSITIONS:
             longest_s = int(self.duration_s * _MAX_POSITIONS / positions)
-            raise ValueError(
-                f"a town of {self.town_size_m:g} m can be simulated for {longest_s} s at most; ask for more towns"
-            )
+            most = f"a town of {self.town_size_m:g} m can be simulated for {longest_s} s at most"
+            raise ValueError(f"{most}; ask for more towns")
         return self
 
 
@@ -76,7 +70,7 @@ def plan_recordings(
         config: of the data set.
         cache_dir: where towns are kept.
         progress: called for each finished town.
-        workers: towns simulated at the same time; the plans do not depend on it.
+        workers: towns simulated at the same time.
         dataset: the name that the logs carry.
 
     Raises:

@@ -31,41 +31,23 @@ STAMP_JITTER_S = 0.001
 
 @dataclass(frozen=True)
 class RecordingPlan:
-    """Everything that determines a recording; small, and cheap to send to another process.
+    """Everything that determines a recording; small, and cheap to send to another process."""
 
-    Args:
-        name: of the recording.
-        split: `train` or `val`.
-        town: folder of the town.
-        town_digest: of the town's specification.
-        drive: which car, from when.
-        seed: of the recording's random numbers.
-        width_px: of the images.
-        height_px: of the images.
-        stereo: `modelled`, `matched`, or `exact` for perfect labels, disparity and motion.
-        dataset: named in the log.
-    """
-
-    name: str
-    split: str
-    town: Path
-    town_digest: str
-    drive: Drive
-    seed: tuple[int, ...]
-    width_px: int
-    height_px: int
-    stereo: str
-    dataset: str = "synthetic"
+    name: str  # of the recording
+    split: str  # `train` or `val`
+    town: Path  # folder of the town
+    town_digest: str  # of the town's specification
+    drive: Drive  # which car, from when
+    seed: tuple[int, ...]  # of the recording's random numbers
+    width_px: int  # of the images
+    height_px: int  # of the images
+    stereo: str  # `modelled`, `matched`, or `exact` for perfect labels, disparity and motion
+    dataset: str = "synthetic"  # named in the log
 
     @property
     def digest(self) -> str:
         """Digest of everything that determines the content."""
         return digest_value({"plan": self.description(), "version": RENDER_VERSION})
-
-    @property
-    def group(self) -> str:
-        """Name of the town, `town03`, which its recordings' names begin with."""
-        return self.name.partition("_")[0]
 
     def description(self) -> dict[str, object]:
         """Return the plan as JSON values, without the place of the town on this machine."""
@@ -87,7 +69,7 @@ def render_recording(plan: RecordingPlan) -> Recording:
         name=plan.name,
         dataset=plan.dataset,
         split=plan.split,
-        group=plan.group,
+        group=plan.name.partition("_")[0],  # the town: town03
         calibrations={CAMERA_NAME: calibration},
         source_digest=plan.digest,
         moments=partial(_moments, plan),
@@ -126,9 +108,8 @@ def _actors(group: Snapshot) -> list[Actor]:
         [group.centre_m, group.yaw_rad, heights_m(group.actor, group.type_index), group.velocity_mps]
     )
     found = []
-    for actor_id, type_index, values in zip(
-        actor_ids(group).tolist(), group.type_index, _rounded(columns), strict=True
-    ):
+    ids = actor_ids(group).tolist()
+    for actor_id, type_index, values in zip(ids, group.type_index, _rounded(columns), strict=True):
         user = ROAD_USERS[type_index]
         x_m, y_m, yaw_rad, height_m, velocity_x, velocity_y = values
         size_m = (user.length_m, user.width_m, height_m)

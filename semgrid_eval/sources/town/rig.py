@@ -13,24 +13,15 @@ from semgrid_eval.sources.town.sensors import Camera, View
 
 # Speed counts more than size here. OpenCV before 4.12 has no choice of filter and ignores it.
 _FILTER, _NO_FILTER, _FILTER_UP = 19, 8, 32
-_COLOUR_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, 0, _FILTER, _NO_FILTER]
-_GREY_PNG = [
-    cv2.IMWRITE_PNG_COMPRESSION,
-    1,
-    cv2.IMWRITE_PNG_STRATEGY,
-    cv2.IMWRITE_PNG_STRATEGY_RLE,
-    _FILTER,
-    _FILTER_UP,
-]
+_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY]
+_COLOUR_PNG = [*_PNG, 0, _FILTER, _NO_FILTER]
+_GREY_PNG = [*_PNG, cv2.IMWRITE_PNG_STRATEGY_RLE, _FILTER, _FILTER_UP]
 
 
 class Rig:
     """One or two cameras and their errors, which depend on those of the frames before.
 
-    Args:
-        camera: whose frames the recording holds.
-        stereo: `modelled` or `matched` disparity, or `exact`: neither disparity nor labels have errors.
-        rng: draws the errors.
+    Disparity is `modelled` or `matched`; where stereo is `exact`, neither disparity nor labels have errors.
     """
 
     def __init__(self, camera: Camera, stereo: str, rng: np.random.Generator) -> None:

@@ -47,12 +47,5 @@ CAR_TYPES = tuple(index for index, user in enumerate(ROAD_USERS) if user.sumo_cl
 
 
 def type_index(name: str) -> int:
-    """Return the index in `ROAD_USERS` of the type with this name.
-
-    Raises:
-        KeyError: there is none.
-    """
-    for index, user in enumerate(ROAD_USERS):
-        if user.name == name:
-            return index
-    raise KeyError(name)
+    """Return the index in `ROAD_USERS` of the type with this name."""
+    return [user.name for user in ROAD_USERS].index(name)

@@ -22,28 +22,18 @@ FIRST_PARKED_ID = 32768
 
 @dataclass(frozen=True)
 class Scene:
-    """What does not move.
+    """What does not move."""
 
-    Args:
-        ground: the flat ground at z = 0.
-        soup: triangles of everything that stands on it, in the map frame.
-        parked: the parked cars; their pixels' instance is `FIRST_PARKED_ID` + their index.
-    """
-
-    ground: Ground
-    soup: Soup
-    parked: Snapshot
+    ground: Ground  # the flat ground at z = 0
+    soup: Soup  # triangles of everything that stands on it, in the map frame
+    parked: Snapshot  # the parked cars; their pixels' instance is `FIRST_PARKED_ID` + their index
 
     def save(self, folder: Path) -> None:
         """Write the scene's arrays."""
         self.ground.save(folder)
         self.soup.save(folder)
-        np.savez(
-            folder / "parked.npz",
-            type_index=self.parked.type_index,
-            centre=self.parked.centre_m,
-            yaw=self.parked.yaw_rad,
-        )
+        still = self.parked
+        np.savez(folder / "parked.npz", type_index=still.type_index, centre=still.centre_m, yaw=still.yaw_rad)
 
     @classmethod
     def load(cls, folder: Path) -> "Scene":

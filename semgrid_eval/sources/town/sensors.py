@@ -15,6 +15,7 @@ from semgrid_eval.recording.types import CameraCalibration, Pose
 from semgrid_eval.sources.town.ground import SURFACE_LABELS, Ground
 from semgrid_eval.sources.town.solids import Soup
 
+Float32s = NDArray[np.float32]
 Float = TypeVar("Float", np.float32, np.float64)
 FULL_WIDTH_PX, FULL_HEIGHT_PX = 2048, 1024
 MAX_DEPTH_M = 400.0
@@ -42,23 +43,14 @@ def cityscapes_camera(width_px: int, height_px: int) -> CameraCalibration:
 
 @dataclass(frozen=True)
 class View:
-    """What a camera sees, one row a pixel, row by row (N = H * W).
+    """What a camera sees, one row a pixel, row by row (N = H * W)."""
 
-    Args:
-        depth_m: (N,) along the optical axis, infinite for the sky.
-        points_m: (N, 3) what is seen, in the frame of the stage; of the sky, something far away.
-        label: (N,) Cityscapes label id.
-        instance: (N,) actor id, 0 where there is none.
-        surface: (N,) of the ground, where there is ground.
-        triangle: (N,) index of the triangle that is seen, `NO_TRIANGLE` where it is ground or sky.
-    """
-
-    depth_m: NDArray[np.float32]
-    points_m: NDArray[np.float32]
-    label: NDArray[np.uint8]
-    instance: NDArray[np.uint16]
-    surface: NDArray[np.uint8]
-    triangle: NDArray[np.int32]
+    depth_m: Float32s  # (N,) along the optical axis, infinite for the sky
+    points_m: Float32s  # (N, 3) what is seen, in the frame of the stage; of the sky, something far away
+    label: NDArray[np.uint8]  # (N,) Cityscapes label id
+    instance: NDArray[np.uint16]  # (N,) actor id, 0 where there is none
+    surface: NDArray[np.uint8]  # (N,) of the ground, where there is ground
+    triangle: NDArray[np.int32]  # (N,) index of the triangle that is seen, `NO_TRIANGLE` where it is ground or sky
 
 
 @dataclass(frozen=True)
@@ -70,7 +62,7 @@ class Camera:
     height_px: int
 
     @cached_property
-    def rays_ego(self) -> NDArray[np.float32]:
+    def rays_ego(self) -> Float32s:
         """Rays (N, 3) in the vehicle frame; their part along the optical axis is 1, so a ray's length is depth."""
         c = self.calibration
         right = (np.arange(self.width_px) - c.u0_px) / c.fx_px
@@ -84,13 +76,13 @@ class Camera:
         return np.array([self.calibration.x_m, self.calibration.y_m, self.calibration.z_m])
 
     @cached_property
-    def ground_depth_m(self) -> NDArray[np.float32]:
+    def ground_depth_m(self) -> Float32s:
         """Depth (N,) at which each ray meets the ground plane, infinite where it does not."""
         fall = -self.rays_ego[:, 2]
         with np.errstate(divide="ignore"):
             return np.where(fall > 0.0, self.origin_ego_m[2] / fall, np.inf).astype(np.float32)
 
-    def disparity_px(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
+    def disparity_px(self, depth_m: Float32s) -> Float32s:
         """Return the disparity of depths; that of the sky is 0."""
         return (self.calibration.fx_px * self.calibration.baseline_m / depth_m).astype(np.float32)
 
@@ -98,7 +90,7 @@ class Camera:
 class RayCaster:
     """Triangles that rays can be cast at."""
 
-    def __init__(self, triangles_m: NDArray[np.float32]) -> None:
+    def __init__(self, triangles_m: Float32s) -> None:
         """Build Embree's tree over triangles (F, 3, 3).
 
         Raises:
@@ -114,15 +106,10 @@ class RayCaster:
         if self.count:
             TriangleMesh(self._scene, np.ascontiguousarray(triangles_m))
 
-    def cast(
-        self, origins_m: NDArray[np.float32], rays: NDArray[np.float32], limit: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """Return how far (N,) each ray gets, in its own lengths, and the triangle (N,) that stops it.
+    def cast(self, origins_m: Float32s, rays: Float32s, limit: Float32s) -> tuple[Float32s, NDArray[np.int32]]:
+        """Return how far each ray from origins (N, 3) gets, in its own lengths, and the triangle that stops it.
 
-        Args:
-            origins_m: (N, 3).
-            rays: (N, 3).
-            limit: (N,) beyond which nothing is seen.
+        Nothing is seen beyond `limit` (N,).
         """
         if not self.count:
             return limit, np.full(len(rays), NO_TRIANGLE, np.int32)
@@ -131,11 +118,8 @@ class RayCaster:
 
 
 def cast_at_all(
-    casters: Sequence[RayCaster],
-    origins_m: NDArray[np.float32],
-    rays: NDArray[np.float32],
-    limit: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    casters: Sequence[RayCaster], origins_m: Float32s, rays: Float32s, limit: Float32s
+) -> tuple[Float32s, NDArray[np.int32]]:
     """Cast rays at several sets of triangles, numbered one set after the other; see `RayCaster.cast`."""
     reached, triangle, first = limit, np.full(len(rays), NO_TRIANGLE, np.int32), 0
     for caster in casters:
@@ -155,13 +139,8 @@ def look(
 ) -> View:
     """Cast one ray a pixel.
 
-    Args:
-        camera: on the vehicle.
-        pose: of the vehicle in the map frame.
-        casters: hold the soup's triangles in the frame of the stage.
-        soup: labels and instances of the triangles.
-        ground: in the map frame.
-        stage_m: x, y of the stage's origin in the map frame, near the vehicle, where single precision is exact enough.
+    The soup's triangles, which the casters hold, are in the frame of the stage. Its origin is `stage_m` (x, y) in the
+    map frame, near the vehicle, where single precision is exact enough.
     """
     rays = _turned(camera.rays_ego, pose.yaw_rad)
     offset_m = (pose.x_m - stage_m[0], pose.y_m - stage_m[1], 0.0)

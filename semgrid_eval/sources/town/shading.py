@@ -66,14 +66,8 @@ class _Materials:
         normal = np.cross(edges[:, 0], edges[:, 1])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         facing = np.maximum(normal[:, 0] * sun[0] + normal[:, 1] * sun[1] + normal[:, 2] * sun[2], 0.0)
-        return cls(
-            normal,
-            facing,
-            np.abs(normal[:, 2]) < 0.7,
-            soup.colour.astype(np.float32),
-            soup.texture,
-            _CONTRAST[soup.texture],
-        )
+        is_wall = np.abs(normal[:, 2]) < 0.7
+        return cls(normal, facing, is_wall, soup.colour.astype(np.float32), soup.texture, _CONTRAST[soup.texture])
 
     @classmethod
     def of_ground(cls, sun: NDArray[np.float32]) -> "_Materials":
@@ -101,10 +95,7 @@ class Painter:
     def paint(self, view: View, casters: Sequence[RayCaster], movers: Soup) -> NDArray[np.uint8]:
         """Return the colour image (H, W, 3) in OpenCV's order (blue, green, red).
 
-        Args:
-            view: what is seen; its triangles are those that stand still, then those that move.
-            casters: hold the triangles that throw shadows.
-            movers: triangles that move, in the frame of the stage.
+        Triangles of the view are those that stand still, then the movers'; those of the casters throw shadows.
         """
         sun = self._sunlight
         materials = _Materials.joined([self._still, _Materials.of_soup(movers, sun.direction), self._ground])

@@ -23,12 +23,7 @@ def simulate_traffic(
 ) -> Traffic:
     """Fill the streets, let the traffic settle, and record `duration_s` of it at 17 Hz.
 
-    Args:
-        network: the town's network; SUMO's other files are put beside it.
-        kind: how dense the traffic is.
-        street_km: length of the town's streets.
-        duration_s: recorded time after the warm-up.
-        rng: source of the seeds that SUMO gets.
+    SUMO's files are put beside the file of the network, whose streets have a length of `street_km`.
 
     Raises:
         InputError: a tool of SUMO failed, or nobody moved.

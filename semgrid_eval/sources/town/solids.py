@@ -2,10 +2,13 @@
 
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from semgrid_eval.geometry import Floats
 
 
 class Texture(IntEnum):
@@ -19,47 +22,24 @@ class Texture(IntEnum):
     PLANKS = 5
 
 
-BOX = np.dtype(
-    [
-        ("x_m", "f8"),  # centre of the base in the map frame
-        ("y_m", "f8"),
-        ("yaw_rad", "f8"),  # direction of the length
-        ("bottom_m", "f8"),
-        ("top_m", "f8"),
-        ("length_m", "f8"),
-        ("width_m", "f8"),
-        ("top_length_m", "f8"),
-        ("top_width_m", "f8"),
-        ("top_shift_m", "f8"),  # of the top against the base, along the length
-        ("label", "u1"),
-        ("texture", "u1"),
-        ("instance", "u2"),
-        ("colour", "u1", (3,)),
-    ]
-)
-Look = tuple[int, int, tuple[int, int, int]]
+_MEASURES = ("x_m", "y_m", "yaw_rad", "bottom_m", "top_m", "length_m", "width_m")
+_OF_TOP = ("top_length_m", "top_width_m", "top_shift_m")
+_LOOKS = [("label", "u1"), ("texture", "u1"), ("instance", "u2"), ("colour", "u1", (3,))]
+BOX = np.dtype([*((name, "f8") for name in _MEASURES + _OF_TOP), *_LOOKS])
+"""A tapered box: centre of its base in the map frame, direction of its length, and its top's shift along the length."""
+Colour = tuple[int, int, int]
+Look = tuple[int, int, Colour]
 """Cityscapes label id, texture and sRGB colour."""
-BoxRow = tuple[
-    float, float, float, float, float, float, float, float, float, float, int, int, int, tuple[int, int, int]
-]
+BoxRow = tuple[float | Colour, ...]
 
 # Corners: bit 0 front, bit 1 left, bit 2 top. Faces turn counter-clockwise seen from outside.
-_BOX_FACES = np.array(
-    [
-        (0, 2, 3),
-        (0, 3, 1),
-        (4, 5, 7),
-        (4, 7, 6),
-        (0, 1, 5),
-        (0, 5, 4),
-        (2, 6, 7),
-        (2, 7, 3),
-        (1, 3, 7),
-        (1, 7, 5),
-        (0, 4, 6),
-        (0, 6, 2),
-    ]
-)
+_FACES = "023 031 457 476 015 054 267 273 137 175 046 062"
+_BOX_FACES = np.array([[int(corner) for corner in face] for face in _FACES.split()])
+
+
+def colours(hexadecimal: str) -> list[Colour]:
+    """Return sRGB colours that are written with six hexadecimal digits each."""
+    return [(red, green, blue) for red, green, blue in map(bytes.fromhex, hexadecimal.split())]
 
 
 def box(
@@ -81,8 +61,8 @@ def box(
         top_size_m: length and width of the top where they differ.
         instance: actor id, 0 where there is none.
     """
-    top = size_m if top_size_m is None else top_size_m
-    return (*place, *heights_m, *size_m, *top, 0.0, look[0], look[1], instance, look[2])
+    label, texture, colour = look
+    return (*place, *heights_m, *size_m, *(top_size_m or size_m), 0.0, label, texture, instance, colour)
 
 
 @dataclass(frozen=True)
@@ -132,36 +112,18 @@ def soup_of_boxes(boxes: NDArray[np.void]) -> Soup:
     ahead_m = front * np.where(is_top, column["top_length_m"], column["length_m"]) + is_top * column["top_shift_m"]
     left_m = left * np.where(is_top, column["top_width_m"], column["width_m"])
     cos, sin = np.cos(column["yaw_rad"]), np.sin(column["yaw_rad"])
-    corners = np.stack(
-        [
-            column["x_m"] + cos * ahead_m - sin * left_m,
-            column["y_m"] + sin * ahead_m + cos * left_m,
-            np.where(is_top, column["top_m"], column["bottom_m"]),
-        ],
-        axis=-1,
-    )
+    x_m, y_m = column["x_m"] + cos * ahead_m - sin * left_m, column["y_m"] + sin * ahead_m + cos * left_m
+    corners = np.stack([x_m, y_m, np.where(is_top, column["top_m"], column["bottom_m"])], axis=-1)
     triangles = corners[:, _BOX_FACES].reshape(-1, 3, 3).astype(np.float32)
-    attributes = (
-        np.repeat(boxes[name], len(_BOX_FACES), axis=0) for name in ("label", "texture", "instance", "colour")
-    )
-    return Soup(triangles, *attributes)
+    return Soup(triangles, *(np.repeat(boxes[name], len(_BOX_FACES), axis=0) for name, *_ in _LOOKS))
 
 
 def soup_of_crowns(
-    centres_m: NDArray[np.float64],
-    radii_m: NDArray[np.float64],
-    label: int,
-    colours: NDArray[np.uint8],
-    rng: np.random.Generator,
+    centres_m: Floats, radii_m: Floats, label: int, colours: NDArray[np.uint8], rng: np.random.Generator
 ) -> Soup:
     """Turn N crowns into 80 N triangles: ellipsoids with a bumpy surface.
 
-    Args:
-        centres_m: (N, 3).
-        radii_m: (N, 2) horizontal and vertical.
-        label: Cityscapes label id.
-        colours: (N, 3) sRGB.
-        rng: draws the bumps.
+    Their centres (N, 3), radii (N, 2), horizontal and vertical, and sRGB colours (N, 3) differ.
     """
     directions, faces = _icosphere()
     bumps = 1.0 + rng.uniform(-0.28, 0.12, (len(centres_m), len(directions), 1))
@@ -177,20 +139,14 @@ def soup_of_crowns(
     )
 
 
-def _icosphere() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _icosphere() -> tuple[Floats, NDArray[np.int64]]:
     """Return the directions (42, 3) and faces (80, 3) of an icosahedron whose faces are split once."""
     golden = (1.0 + 5.0**0.5) / 2.0
     corners = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
     points = np.array([np.roll(corner, turn) for turn in range(3) for corner in corners])
     distances = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = distances < 2.1
-    faces = [
-        (a, b, c)
-        for a in range(12)
-        for b in range(a + 1, 12)
-        for c in range(b + 1, 12)
-        if near[a, b] & near[b, c] & near[a, c]
-    ]
+    faces = [face for face in combinations(range(12), 3) if all(near[edge] for edge in combinations(face, 2))]
     corners_of = [tuple(face) if _is_outward(points, face) else (face[0], face[2], face[1]) for face in faces]
     places = list(points)
     middle: dict[frozenset[int], int] = {}
@@ -207,6 +163,6 @@ def _icosphere() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return directions / np.linalg.norm(directions, axis=1, keepdims=True), np.array(split)
 
 
-def _is_outward(points: NDArray[np.float64], face: tuple[int, int, int]) -> bool:
+def _is_outward(points: Floats, face: tuple[int, int, int]) -> bool:
     first, second, third = points[list(face)]
     return bool(np.dot(np.cross(second - first, third - first), first) > 0.0)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from semgrid_eval.geometry import Floats
 from semgrid_eval.sources.town.kinds import TownKind
 from semgrid_eval.sources.town.sumo import run_binary
 
@@ -18,6 +18,8 @@ SPEED_LIMIT_MPS = 13.6
 JUNCTION_RADIUS_M = 8.0
 _BEND_POINTS = 7
 _NETWORK = "town.net.xml"
+Places = dict[str, Floats]
+"""Of junctions (2,), by name."""
 
 
 @dataclass(frozen=True)
@@ -51,23 +53,17 @@ def lay_out_streets(kind: TownKind, size_m: float, rng: np.random.Generator, fol
     return folder / _NETWORK
 
 
-def _positions(path: Path) -> dict[str, NDArray[np.float64]]:
+def _positions(path: Path) -> Places:
     nodes = ET.parse(path).getroot().iter("node")
     return {node.attrib["id"]: np.array([float(node.attrib["x"]), float(node.attrib["y"])]) for node in nodes}
 
 
-def _displaced(
-    positions: dict[str, NDArray[np.float64]], kind: TownKind, rng: np.random.Generator
-) -> dict[str, NDArray[np.float64]]:
+def _displaced(positions: Places, kind: TownKind, rng: np.random.Generator) -> Places:
     limit_m = 0.22 * kind.block_m
-    return {
-        name: place + np.clip(rng.normal(0.0, kind.jitter_m, 2), -limit_m, limit_m) for name, place in positions.items()
-    }
+    return {name: at + np.clip(rng.normal(0.0, kind.jitter_m, 2), -limit_m, limit_m) for name, at in positions.items()}
 
 
-def _write_nodes(
-    path: Path, positions: dict[str, NDArray[np.float64]], kind: TownKind, rng: np.random.Generator
-) -> None:
+def _write_nodes(path: Path, positions: Places, kind: TownKind, rng: np.random.Generator) -> None:
     root = ET.Element("nodes")
     for name, (x_m, y_m) in positions.items():
         control = "traffic_light" if rng.random() < kind.traffic_lights else "priority"
@@ -76,9 +72,7 @@ def _write_nodes(
     ET.ElementTree(root).write(path)
 
 
-def _write_edges(
-    path: Path, grid: Path, positions: dict[str, NDArray[np.float64]], kind: TownKind, rng: np.random.Generator
-) -> None:
+def _write_edges(path: Path, grid: Path, positions: Places, kind: TownKind, rng: np.random.Generator) -> None:
     root = ET.Element("edges")
     streets: dict[tuple[str, str], _Street | None] = {}
     for edge in ET.parse(grid).getroot().iter("edge"):
@@ -108,7 +102,7 @@ def _draw_street(kind: TownKind, length_m: float, rng: np.random.Generator) -> _
     )
 
 
-def _bent_line(start: NDArray[np.float64], end: NDArray[np.float64], bend_m: float) -> NDArray[np.float64]:
+def _bent_line(start: Floats, end: Floats, bend_m: float) -> Floats:
     """Return the centre line (N, 2): a parabola whose middle lies `bend_m` left of the straight line."""
     along = np.linspace(0.0, 1.0, _BEND_POINTS if bend_m else 2)[:, None]
     direction = (end - start) / np.linalg.norm(end - start)
@@ -116,7 +110,7 @@ def _bent_line(start: NDArray[np.float64], end: NDArray[np.float64], bend_m: flo
     return np.asarray(start + along * (end - start) + 4.0 * along * (1.0 - along) * bend_m * left)
 
 
-def _add_edge(root: ET.Element, name: str, ends: tuple[str, str], street: _Street, line: NDArray[np.float64]) -> None:
+def _add_edge(root: ET.Element, name: str, ends: tuple[str, str], street: _Street, line: Floats) -> None:
     lanes: list[dict[str, str]] = [{"allow": "pedestrian", "width": str(SIDEWALK_WIDTH_M)}]
     if street.has_parking:
         lanes.append({"disallow": "all", "width": str(PARKING_WIDTH_M)})

@@ -32,12 +32,7 @@ def run_binary(name: str, options: list[str], folder: Path) -> None:
 
 
 def run_tool(name: str, options: list[str], folder: Path) -> None:
-    """Run one of SUMO's Python tools (`randomTrips`) inside `folder`.
-
-    Raises:
-        InputError: it failed; the message is the tool's own.
-        MissingExtraError: SUMO is not installed.
-    """
+    """Run one of SUMO's Python tools (`randomTrips`) inside `folder`; raises what `run_binary` raises."""
     _run(name, [sys.executable, str(sumo_home() / "tools" / f"{name}.py"), *options], folder)
 
 

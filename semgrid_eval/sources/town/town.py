@@ -24,21 +24,13 @@ _SPEC_FILE = "town.json"
 
 @dataclass(frozen=True)
 class TownSpec:
-    """Everything that determines a town.
+    """Everything that determines a town."""
 
-    Args:
-        index: which town of a data set; it chooses the kind.
-        kind: name of a `TownKind`.
-        seed: of the data set.
-        size_m: side of the square that the streets cover.
-        duration_s: recorded time.
-    """
-
-    index: int
-    kind: str
-    seed: int
-    size_m: float
-    duration_s: float
+    index: int  # which town of a data set; it chooses the kind
+    kind: str  # name of a `TownKind`
+    seed: int  # of the data set
+    size_m: float  # side of the square that the streets cover
+    duration_s: float  # recorded time
 
     def digest(self) -> str:
         """Digest the specification and the versions of what builds the town.

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.geometry import Floats
 from semgrid_eval.sources.town.road_users import ROAD_USERS, Shape
 
 _JUMP_M = 1.0  # nobody moves that far in one step of 59 ms; SUMO's pedestrians now and then do
@@ -15,21 +16,13 @@ _IS_PERSON = np.array([user.shape is Shape.PERSON for user in ROAD_USERS])
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Everybody at one moment; all arrays have one row an actor.
+    """Everybody at one moment; all arrays have one row an actor."""
 
-    Args:
-        actor: (A,) index of the actor in its town.
-        type_index: (A,) index into `ROAD_USERS`.
-        centre_m: (A, 2) centre of the footprint in the map frame.
-        yaw_rad: (A,) counter-clockwise from the map's x axis.
-        velocity_mps: (A, 2) in the map frame.
-    """
-
-    actor: NDArray[np.int32]
-    type_index: NDArray[np.uint8]
-    centre_m: NDArray[np.float64]
-    yaw_rad: NDArray[np.float64]
-    velocity_mps: NDArray[np.float64]
+    actor: NDArray[np.int32]  # (A,) index of the actor in its town
+    type_index: NDArray[np.uint8]  # (A,) index into `ROAD_USERS`
+    centre_m: Floats  # (A, 2) centre of the footprint in the map frame
+    yaw_rad: Floats  # (A,) counter-clockwise from the map's x axis
+    velocity_mps: Floats  # (A, 2) in the map frame
 
     def __len__(self) -> int:
         return len(self.actor)
@@ -41,25 +34,15 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Traffic:
-    """SUMO's trajectories, sorted by time; rows `offsets[i]` to `offsets[i + 1]` belong to `times_s[i]`.
+    """SUMO's trajectories, sorted by time; rows `offsets[i]` to `offsets[i + 1]` belong to `times_s[i]`."""
 
-    Args:
-        times_s: (T,) times of the steps.
-        offsets: (T + 1,) first row of each step.
-        actor: (R,) index of the actor.
-        position_m: (R, 2) middle of the front bumper in the map frame (of a person: the person).
-        heading_rad: (R,) counter-clockwise from the map's x axis.
-        speed_mps: (R,) along the heading.
-        actor_types: (A,) index into `ROAD_USERS` of each actor.
-    """
-
-    times_s: NDArray[np.float64]
-    offsets: NDArray[np.int64]
-    actor: NDArray[np.int32]
-    position_m: NDArray[np.float32]
-    heading_rad: NDArray[np.float32]
-    speed_mps: NDArray[np.float32]
-    actor_types: NDArray[np.uint8]
+    times_s: Floats  # (T,) times of the steps
+    offsets: NDArray[np.int64]  # (T + 1,) first row of each step
+    actor: NDArray[np.int32]  # (R,) index of the actor
+    position_m: NDArray[np.float32]  # (R, 2) middle of the front bumper in the map frame (of a person: the person)
+    heading_rad: NDArray[np.float32]  # (R,) counter-clockwise from the map's x axis
+    speed_mps: NDArray[np.float32]  # (R,) along the heading
+    actor_types: NDArray[np.uint8]  # (A,) index into `ROAD_USERS` of each actor
 
     def save(self, folder: Path) -> None:
         """Write one `.npy` file an array."""
@@ -94,7 +77,7 @@ class Traffic:
             actor, np.asarray(self.actor_types[actor]), start + share * moved, yaw + share * turn, moved / span_s
         )
 
-    def track(self, actor: int, first_step: int, end_step: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def track(self, actor: int, first_step: int, end_step: int) -> tuple[Floats, Floats]:
         """Return one actor's front positions (S, 2) and headings (S,) over steps; NaN where it is not there."""
         positions = np.full((end_step - first_step, 2), np.nan)
         headings = np.full(end_step - first_step, np.nan)
@@ -108,7 +91,7 @@ class Traffic:
     def _rows(self, step: int) -> slice:
         return slice(int(self.offsets[step]), int(self.offsets[step + 1]))
 
-    def _centres(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _centres(self, rows: NDArray[np.int64]) -> Floats:
         """Return the centres (N, 2) of the footprints: half a length behind the front bumper."""
         types = self.actor_types[self.actor[rows]]
         back_m = np.where(_IS_PERSON[types], 0.0, 0.5 * _LENGTHS_M[types])
@@ -117,6 +100,6 @@ class Traffic:
         return np.asarray(self.position_m[rows].astype(np.float64) - back_m[:, None] * ahead)
 
 
-def _wrapped(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+def _wrapped(angle_rad: Floats) -> Floats:
     """Wrap angles to -pi..pi."""
     return (angle_rad + np.pi) % (2.0 * np.pi) - np.pi

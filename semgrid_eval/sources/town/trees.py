@@ -45,17 +45,11 @@ def draw_bush(x_m: float, y_m: float, rng: np.random.Generator) -> Tree:
 def soup_of_trees(trees: list[Tree], rng: np.random.Generator) -> Soup:
     """Turn trees into triangles."""
     look = (_VEGETATION, Texture.PLAIN, _BARK)
-    trunks = [
-        box(
-            (tree.x_m, tree.y_m, 0.4),
-            (0.0, tree.crown_m),
-            (tree.trunk_m, tree.trunk_m),
-            look,
-            top_size_m=(0.6 * tree.trunk_m, 0.6 * tree.trunk_m),
-        )
-        for tree in trees
-        if tree.trunk_m > 0.0
-    ]
+    trunks = []
+    for tree in trees:
+        if tree.trunk_m > 0.0:
+            place, thick, thin = (tree.x_m, tree.y_m, 0.4), tree.trunk_m, 0.6 * tree.trunk_m
+            trunks.append(box(place, (0.0, tree.crown_m), (thick, thick), look, top_size_m=(thin, thin)))
     crowns = soup_of_crowns(
         np.array([(tree.x_m, tree.y_m, tree.crown_m) for tree in trees]).reshape(-1, 3),
         np.array([(tree.radius_m, tree.half_height_m) for tree in trees]).reshape(-1, 2),

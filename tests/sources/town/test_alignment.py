@@ -12,7 +12,7 @@ from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import write_log
 from semgrid_eval.sources.town.drives import ego_path
-from semgrid_eval.sources.town.recordings import render_recording
+from semgrid_eval.sources.town.rendering import render_recording
 from semgrid_eval.sources.town.town import load_town
 
 STATIC = [CLASS_NAMES.index(name) for name in ("road", "sidewalk", "building", "vegetation", "pole_sign")]

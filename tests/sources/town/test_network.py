@@ -1,9 +1,11 @@
+import math
+
 import numpy as np
 import pytest
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.sources.town.kinds import KINDS
-from semgrid_eval.sources.town.network import LaneUse, read_network
+from semgrid_eval.sources.town.network import LaneUse, Polyline, read_network
 from semgrid_eval.sources.town.streets import SIDEWALK_WIDTH_M, lay_out_streets
 
 NET = """<net>
@@ -19,6 +21,7 @@ NET = """<net>
   <junction id="a" type="priority" shape="-1,-1 1,-1 1,1"/>
   <junction id="b" type="traffic_light" shape="30,-9 40,-9 40,9 30,9"/>
 </net>"""
+CORNER = Polyline.through(np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 0.0), (10.0, 5.0)]))
 
 
 def test_lanes_are_told_apart_by_whom_they_are_for(tmp_path):
@@ -56,3 +59,18 @@ def test_every_kind_of_town_has_streets_for_everybody(kind, tmp_path):
     west_m, south_m, east_m, north_m = network.bounds_m()
     assert 300 < east_m - west_m < 600
     assert 300 < north_m - south_m < 600
+
+
+def test_places_lie_along_the_line_and_to_its_left():
+    assert CORNER.length_m == pytest.approx(15.0)
+    assert CORNER.at(4.0, 2.0) == pytest.approx((4.0, 2.0, 0.0))
+    assert CORNER.at(12.0, 2.0) == pytest.approx((8.0, 2.0, math.pi / 2))
+
+
+def test_beyond_its_ends_a_line_goes_straight_on():
+    assert CORNER.at(-3.0) == pytest.approx((-3.0, 0.0, 0.0))
+    assert CORNER.at(17.0) == pytest.approx((10.0, 7.0, math.pi / 2))
+
+
+def test_a_piece_keeps_the_corners_inside_it():
+    np.testing.assert_allclose(CORNER.piece(8.0, 12.0), [(8, 0), (10, 0), (10, 2)])
