@@ -8,99 +8,68 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from semgrid_eval.api import (
-        build_grids,
-        convert,
-        find_logs,
-        fit,
-        load_run,
-        make_model,
-        make_windows,
-        open_log,
-        plot_grid,
-        run,
-        score,
-        write_report,
-    )
-    from semgrid_eval.classes import CLASS_NAMES, CLASSES
-    from semgrid_eval.config import Config
-    from semgrid_eval.errors import SemgridError
-    from semgrid_eval.grids.recording import GridRecording
-    from semgrid_eval.grids.spec import GridConfig, GridSpec
-    from semgrid_eval.models.model import Baseline, Given, Model, one_hot
-    from semgrid_eval.models.network import Network, NetworkSettings, input_planes
-    from semgrid_eval.scores.evaluate import Evaluation, evaluate
-    from semgrid_eval.scores.tidy import tidy
-    from semgrid_eval.windows.data import WindowBatch, WindowSet
-    from semgrid_eval.windows.plan import WindowConfig
+    from semgrid_eval.api import build_grids as build_grids
+    from semgrid_eval.api import convert as convert
+    from semgrid_eval.api import find_logs as find_logs
+    from semgrid_eval.api import fit as fit
+    from semgrid_eval.api import load_run as load_run
+    from semgrid_eval.api import make_model as make_model
+    from semgrid_eval.api import make_windows as make_windows
+    from semgrid_eval.api import open_log as open_log
+    from semgrid_eval.api import plot_grid as plot_grid
+    from semgrid_eval.api import run as run
+    from semgrid_eval.api import score as score
+    from semgrid_eval.api import write_report as write_report
+    from semgrid_eval.classes import CLASS_NAMES as CLASS_NAMES
+    from semgrid_eval.classes import CLASSES as CLASSES
+    from semgrid_eval.config import Config as Config
+    from semgrid_eval.errors import SemgridError as SemgridError
+    from semgrid_eval.grids.recording import GridRecording as GridRecording
+    from semgrid_eval.grids.spec import GridConfig as GridConfig
+    from semgrid_eval.grids.spec import GridSpec as GridSpec
+    from semgrid_eval.models.model import Baseline as Baseline
+    from semgrid_eval.models.model import Given as Given
+    from semgrid_eval.models.model import Model as Model
+    from semgrid_eval.models.model import one_hot as one_hot
+    from semgrid_eval.models.network import Network as Network
+    from semgrid_eval.models.network import NetworkSettings as NetworkSettings
+    from semgrid_eval.models.network import input_planes as input_planes
+    from semgrid_eval.scores.evaluate import Evaluation as Evaluation
+    from semgrid_eval.scores.evaluate import evaluate as evaluate
+    from semgrid_eval.scores.tidy import tidy as tidy
+    from semgrid_eval.windows.data import WindowBatch as WindowBatch
+    from semgrid_eval.windows.data import WindowSet as WindowSet
+    from semgrid_eval.windows.plan import WindowConfig as WindowConfig
+
+_NAMES = {
+    "api": "build_grids convert find_logs fit load_run make_model make_windows open_log plot_grid "
+    "run score write_report",
+    "classes": "CLASSES CLASS_NAMES",
+    "config": "Config",
+    "errors": "SemgridError",
+    "grids.recording": "GridRecording",
+    "grids.spec": "GridConfig GridSpec",
+    "models.model": "Baseline Given Model one_hot",
+    "models.network": "Network NetworkSettings input_planes",
+    "scores.evaluate": "Evaluation evaluate",
+    "scores.tidy": "tidy",
+    "windows.data": "WindowBatch WindowSet",
+    "windows.plan": "WindowConfig",
+}
+_PLACES = {name: f"{__name__}.{module}" for module, names in _NAMES.items() for name in names.split()}
+__all__ = ["__version__", *_PLACES]
 
 try:
     __version__ = version("semgrid-eval")
 except PackageNotFoundError:  # running from a source tree that was never installed
     __version__ = "0.0.0"
 
-__all__ = [
-    "CLASSES",
-    "CLASS_NAMES",
-    "Baseline",
-    "Config",
-    "Evaluation",
-    "Given",
-    "GridConfig",
-    "GridRecording",
-    "GridSpec",
-    "Model",
-    "Network",
-    "NetworkSettings",
-    "SemgridError",
-    "WindowBatch",
-    "WindowConfig",
-    "WindowSet",
-    "__version__",
-    "build_grids",
-    "convert",
-    "evaluate",
-    "find_logs",
-    "fit",
-    "input_planes",
-    "load_run",
-    "make_model",
-    "make_windows",
-    "one_hot",
-    "open_log",
-    "plot_grid",
-    "run",
-    "score",
-    "tidy",
-    "write_report",
-]
-
-_API = (
-    *("build_grids", "convert", "find_logs", "fit", "load_run", "make_model", "make_windows"),
-    *("open_log", "plot_grid", "run", "score", "write_report"),
-)
-_PLACES = {
-    **dict.fromkeys(_API, "api"),
-    **dict.fromkeys(("CLASSES", "CLASS_NAMES"), "classes"),
-    "Config": "config",
-    "SemgridError": "errors",
-    "GridRecording": "grids.recording",
-    **dict.fromkeys(("GridConfig", "GridSpec"), "grids.spec"),
-    **dict.fromkeys(("Baseline", "Given", "Model", "one_hot"), "models.model"),
-    **dict.fromkeys(("Network", "NetworkSettings", "input_planes"), "models.network"),
-    **dict.fromkeys(("Evaluation", "evaluate"), "scores.evaluate"),
-    "tidy": "scores.tidy",
-    **dict.fromkeys(("WindowBatch", "WindowSet"), "windows.data"),
-    "WindowConfig": "windows.plan",
-}
-
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever is asked for
     """Import what is asked for: torch and matplotlib only where they are needed."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = getattr(import_module(f"{__name__}.{_PLACES[name]}"), name)
-    globals()[name] = found
+    globals()[name] = found = getattr(import_module(_PLACES[name]), name)
     return found
 
 
