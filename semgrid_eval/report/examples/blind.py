@@ -26,13 +26,12 @@ def blind_cells(track: Track, grid: GridConfig, sensors: Sequence[str], window: 
         window: tells the times of target and inputs.
 
     Returns:
-        None where an input sensor is not a part of the shown camera's image, or where the times of inputs are not
-        known or not those of its frames.
+        None where an input sensor is not a part of the shown camera's image, or inputs have other times than frames.
     """
     parts = parts_of_shown(grid)
     place = {int(stamp): frame for frame, stamp in enumerate(track.stamps_ns)}
     stamps = (window.target_stamp_ns, *window.input_stamps_ns)
-    if len(stamps) < 2 or not all(stamp in place for stamp in stamps) or not all(name in parts for name in sensors):
+    if not all(stamp in place for stamp in stamps) or not all(name in parts for name in sensors):
         return None
     target, *inputs = (place[stamp] for stamp in stamps)
     first = max(0, target - window.target_frame)  # of the stretch whose orientation the grids have

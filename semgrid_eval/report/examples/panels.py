@@ -126,8 +126,8 @@ class Shown:
         model = self.contest.model
         inputs, names = self._seen[model.name][i]["inputs"], model.record.facts.sensors
         sensors, steps = inputs.shape[:2]
-        for t in range(steps):
-            title, stamp_ns = f"Input {t + 1} of {steps}", view.input_stamp_ns(steps - 1 - t)
+        for t, stamp_ns in enumerate(view.window.input_stamps_ns):
+            title = f"Input {t + 1} of {steps}"
             grids = (_input_picture(inputs[s, t], title, names[s] if sensors > 1 else "") for s in range(sensors))
             yield Column(title, view.before(stamp_ns), (*view.photos(stamp_ns, title), *grids))
 
@@ -146,8 +146,7 @@ class Shown:
                 title = f"{baseline.name}{self._iou(baseline, i)}"
                 grids.append(self._prediction(baseline, i, title, lead=False))
             title = f"{plural(row.record.facts.horizon_steps, 'step')} ahead"
-            stamps = row.shown.record.windows[row.shown.places[key_of(self._windows[i])]].input_stamps_ns
-            stamp_ns = stamps[-1] if stamps else None
+            stamp_ns = row.shown.record.windows[row.shown.places[key_of(self._windows[i])]].input_stamps_ns[-1]
             yield Column(title, view.before(stamp_ns), (*view.photos(stamp_ns, title), *grids))
 
     def _answer(self, row: Row, i: int, *, step: bool) -> Column:

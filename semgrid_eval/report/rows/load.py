@@ -32,7 +32,6 @@ from semgrid_eval.scores.results import (
 WindowReader = Callable[[Path, str], Mapping[str, NDArray[Any]]]
 """Reads a set of windows, as `scores.results.read_windows` does, from a run by its id."""
 
-
 SumsReader = Callable[[str, str], NDArray[np.int32] | None]
 """Reads what a metric counted by a partition, as `scores.results.read_sums` does from a result's folder."""
 
@@ -58,11 +57,6 @@ class Result:
         """The names (R,) of the drives that windows come from, and the index of each window's (N,)."""
         names, owner = np.unique([window.drive for window in self.record.windows], return_inverse=True)
         return names, owner
-
-    @cached_property
-    def log_of(self) -> Mapping[str, str]:
-        """The path of the log of each drive."""
-        return {window.drive: window.log for window in self.record.windows}
 
     @cached_property
     def grid(self) -> GridConfig | None:
@@ -97,7 +91,7 @@ class Row:
     results: tuple[Result, ...]
     failures: tuple[str, ...]
     run: Path
-    groups: Mapping[str, str] = field(default_factory=dict)  # by a log's path: the town, city or drive it belongs to
+    groups: Mapping[str, str] = field(default_factory=dict)  # by a log's path
 
     @property
     def is_left(self) -> bool:
@@ -109,10 +103,11 @@ class Row:
         """Whether other rows are measured against this one."""
         return self.record.facts.baseline
 
-    @property
-    def learns(self) -> bool:
-        """Whether its model was fitted to training windows."""
-        return self.record.facts.learns
+    @cached_property
+    def group_of(self) -> Mapping[str, str]:
+        """The group that each drive belongs to: a town, city or drive, by default the drive itself."""
+        windows = (window for result in self.results for window in result.record.windows)
+        return {window.drive: self.groups.get(window.log) or window.drive for window in windows}
 
     @property
     def targets(self) -> str:

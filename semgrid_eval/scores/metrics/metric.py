@@ -1,6 +1,5 @@
 """What a metric is, and what it sees: scored windows whose cells are divided into regions."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -73,29 +72,12 @@ class Metric(Protocol):
     numerator and a denominator for each of `ratio_names`, both linear in the sums, so that they can be summed as well.
     """
 
-    @property
-    def name(self) -> str:
-        """The name in files and columns."""
-
-    @property
-    def title(self) -> str:
-        """What its figures are, in words, at the start of a sentence."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The shape of what is counted in one region of one window."""
-
-    @property
-    def ratio_names(self) -> Sequence[str]:
-        """The names of the K ratios."""
-
-    @property
-    def columns(self) -> Sequence[Column]:
-        """The Q figures."""
-
-    @property
-    def shown(self) -> Sequence[str]:
-        """The columns that a report shows where a partition asks for no others."""
+    name: str  # in files and columns
+    title: str  # what its figures are, in words, at the start of a sentence
+    shape: tuple[int, ...]  # of what is counted in one region of one window
+    ratio_names: tuple[str, ...]  # of the K ratios
+    columns: tuple[Column, ...]  # the Q figures
+    shown: tuple[str, ...]  # the columns that a report shows where a partition asks for no others
 
     def count(self, scored: ScoredWindows, regions: Regions) -> Counts:
         """Count in each window and region: -> (N, regions, *shape)."""
@@ -105,6 +87,7 @@ class Metric(Protocol):
 
     def figures(self, ratios: Counts) -> Floats:
         """Divide: (..., K, 2) -> (..., Q); NaN where there is nothing to divide by."""
+        return divided(ratios[..., 0], ratios[..., 1])
 
     def cells(self, sums: Counts) -> Counts:
         """Count the cells that stand behind each figure: (..., *shape) -> (..., Q)."""
@@ -127,6 +110,4 @@ def divided(part: NDArray[np.number], whole: Counts) -> Floats:
 
 def mean_finite(values: Floats, *, axis: int = -1) -> Floats:
     """Mean of the values along an axis that are there, NaN where none is."""
-    present = np.isfinite(values)
-    total = np.where(present, values, 0.0).sum(axis=axis)
-    return divided(total, present.sum(axis=axis))
+    return divided(np.nansum(values, axis=axis), np.isfinite(values).sum(axis=axis))
