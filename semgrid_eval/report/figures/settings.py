@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
 from semgrid_eval.report.figures.style import INK, PALETTE, SETTINGS, Plot, evidence, finish, short
 from semgrid_eval.report.rows.pairing import HEADLINE
-from semgrid_eval.report.rows.varied import Varied, varied_settings
+from semgrid_eval.report.rows.settings import Varied, varied_settings
 
 COLUMNS = ("figure", "row", "setting", "value", "by", "by_value", "parameters", "iou", "low", "high", "window_ms")
 _ASIDE = 0.02  # of the axis: how far lines stand apart, so that their intervals can be told apart

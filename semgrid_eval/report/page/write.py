@@ -1,7 +1,6 @@
 """Writes a report: one self-contained page, tables for people and for machines, and figures."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -18,17 +17,15 @@ from semgrid_eval.report.claims.paper import in_paper
 from semgrid_eval.report.estimates.bootstrap import Parts, Scores
 from semgrid_eval.report.estimates.paces import EDGES_MPS
 from semgrid_eval.report.estimates.resampling import Level, Resampling
-from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
+from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, class_style, data_uri
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
 from semgrid_eval.report.page import provenance
-from semgrid_eval.report.page.colours import class_style
 from semgrid_eval.report.page.material import Material, gather
 from semgrid_eval.report.page.summary import summarise
 from semgrid_eval.report.rows.load import Row, load_runs
 from semgrid_eval.report.rows.pairing import Headline, headline
 from semgrid_eval.report.tables import write as exports
-from semgrid_eval.report.tables.divisions import division_tables
-from semgrid_eval.report.tables.scores import confusion_table, score_tables
+from semgrid_eval.report.tables.scores import confusion_table
 from semgrid_eval.report.tables.table import Table
 
 PAGE = "index.html"
@@ -55,38 +52,15 @@ def write_report(
     out = folders[0] / "report" if out is None else out
     _check_replaceable(out)
     material = gather(load_runs(folders, progress=progress), Resampling(_SEED, level=resample))
-    tables = page_tables(material)
     with atomic_folder(out) as folder:
         exports.write_numbers(folder, material)
-        exports.write_tables(folder, all_tables(tables))
+        exports.write_tables(folder, material.all_tables)
         exports.write_figures(folder, material.figures)
-        (folder / PAGE).write_text(render_page(material, tables), encoding="utf-8")
+        (folder / PAGE).write_text(render_page(material), encoding="utf-8")
     return out / PAGE
 
 
-@dataclass(frozen=True)
-class PageTables:
-    """The page's tables of scores: of all cells by name, and of every metric by division."""
-
-    scores: Mapping[str, Table | None]
-    divisions: Mapping[str, Sequence[Table]]
-
-
-def page_tables(material: Material) -> PageTables:
-    """Make the page's tables of scores."""
-    return PageTables(
-        score_tables(material.scores, [each.tag for each in material.runs]),
-        division_tables(material.everything, material.divisions),
-    )
-
-
-def all_tables(tables: PageTables) -> list[Table]:
-    """List the page's tables of scores that have something to show."""
-    found = [*tables.scores.values(), *(table for each in tables.divisions.values() for table in each)]
-    return [table for table in found if table is not None and table.bodies]
-
-
-def render_page(material: Material, tables: PageTables) -> str:
+def render_page(material: Material) -> str:
     """Render the page as HTML that needs nothing but itself."""
     runs, scores = material.runs, material.scores
     found = headline(scores)
@@ -108,8 +82,8 @@ def render_page(material: Material, tables: PageTables) -> str:
         title=", ".join(each.record.title for each in runs),
         summary=summarise(runs, scores, found),
         resampled=material.resampling.sentence,
-        tables=tables.scores,
-        parts=tables.divisions,
+        tables=material.tables,
+        parts=material.parts,
         about_settings=sum(not in_paper(e.row.record.name) for e in scores.values()) > len(scores) / 2,
         findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
         margin=MARGIN,
@@ -121,7 +95,7 @@ def render_page(material: Material, tables: PageTables) -> str:
         gaps=gaps(rows, examples),
         widths=widths(rows),
         stands_mps=EDGES_MPS[0],
-        unpaced=rows_without(material.parts["paces"], rows),
+        unpaced=rows_without(material.everything["iou"]["paces"], rows),
         failures=provenance.failures(runs),
         logs=provenance.log_table(runs),
         results=provenance.result_table(runs),

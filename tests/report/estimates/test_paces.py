@@ -82,7 +82,7 @@ def test_a_run_that_knows_no_drive_says_so(tmp_path, tracks):
     runs = made(tmp_path, tracks)
     assert scored(runs) == {}
     page = write_report(tmp_path / "run")
-    assert "No result here tells how its vehicle drove" in page.read_text()
+    assert "No result here tells how fast its vehicle drove" in page.read_text()
     assert "paces" not in (page.parent / "summary.csv").read_text()
 
 
@@ -98,4 +98,4 @@ def test_a_log_whose_drive_is_unknown_is_left_out(tmp_path):
 def test_a_run_with_pictures_shows_its_paces(seen_page):
     text = seen_page.read_text()
     assert 'id="table-paces"' in text
-    assert "No result here tells how its vehicle drove" not in text
+    assert "No result here tells how fast its vehicle drove" not in text
