@@ -70,29 +70,17 @@ class WindowRecord(Config):
 
 
 class RowFacts(Config):
-    """What a row is, whatever it is called: differences, pairs, curves and examples are formed by this alone.
+    """What a row is, whatever it is called: differences, pairs, curves and examples are formed by this alone."""
 
-    Args:
-        model: as the matrix names it: `ed`, `fuse`, `mine.py:Mine`.
-        family: of models, which figures draw alike: `ED`, `BL`, or that of a model of one's own.
-        learns: whether it was fitted to training windows, by counts or by gradient.
-        baseline: whether other rows are measured against it.
-        inputs: grids of the past, by sensor.
-        step_frames: frames between inputs.
-        horizon_steps: steps from the newest input to the target.
-        sensors: names of the inputs' sensors.
-        translate: whether inputs are moved into the target's place.
-    """
-
-    model: str
-    family: str
-    learns: bool
-    baseline: bool
-    inputs: int
-    step_frames: int
-    horizon_steps: int
-    sensors: tuple[str, ...]
-    translate: bool
+    model: str  # as the matrix names it: `ed`, `fuse`, `mine.py:Mine`
+    family: str  # of models, which figures draw alike: `ED`, `BL`, or that of a model of one's own
+    learns: bool  # whether it was fitted to training windows, by counts or by gradient
+    baseline: bool  # whether other rows are measured against it
+    inputs: int  # grids of the past, by sensor
+    step_frames: int  # frames between inputs
+    horizon_steps: int  # steps from the newest input to the target
+    sensors: tuple[str, ...]  # names of the inputs' sensors
+    translate: bool  # whether inputs are moved into the target's place
 
 
 class ResultRecord(Config):

@@ -39,10 +39,7 @@ def load_figures(
 ) -> pd.DataFrame:
     """Return every figure of a run, pooled over the windows of a result: `FIGURE_COLUMNS`.
 
-    Args:
-        run: its folder.
-        metrics: names of `METRICS`, all by default.
-        partitions: names of `PARTITIONS`, all by default.
+    Metrics and partitions are names of `METRICS` and `PARTITIONS`, all by default.
 
     Raises:
         InputError: the run or a result of it cannot be read.

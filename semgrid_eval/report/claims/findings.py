@@ -10,7 +10,7 @@ import pandas as pd
 
 from semgrid_eval.report.claims.claims import MARGIN, WINDOW_MS, Check, Claim, Rule, claims
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores, Scores, weighted_sum
-from semgrid_eval.report.rows.load import Run, comparable
+from semgrid_eval.report.rows.load import Run
 from semgrid_eval.report.tables.table import (
     ABSENT,
     MINUS,
@@ -39,16 +39,13 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """A comparison with its numbers: IoU with the paired interval, or milliseconds with the range over pairs of rows.
-
-    Without the rows it needs, it has no number and names what is missing.
-    """
+    """A comparison with its numbers: IoU with the paired interval, or milliseconds with the range over pairs."""
 
     check: Check
     verdict: Verdict
     difference: Estimate
     windows: int
-    missing: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()  # what it needs, where it has no number
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,11 @@ def sentence(findings: Sequence[Finding]) -> str:
 
 def finding_table(name: str, findings: Sequence[Finding]) -> Table:
     """Show the claims that were tested, each above the comparisons behind it."""
-    bodies = tuple(_body(each) for each in findings if each.verdict is not Verdict.NOT_RUN)
+    bodies = tuple(
+        (Line(each.claim.text, (_verdict_cell(each.verdict), Cell(""), Cell(""))), *map(_line, each.outcomes))
+        for each in findings
+        if each.verdict is not Verdict.NOT_RUN
+    )
     columns = (("Verdict", ""), ("Score", ""), ("Difference", "95% interval"))
     caption = f"The paper's claims, and the same against stronger baselines{_tag(findings)}."
     return Table(name, caption, "Claim", columns, bodies)
@@ -163,8 +164,7 @@ def _missing(check: Check, scored: Scores, near: Scores) -> tuple[str, ...]:
         return missing
     if any(name not in near for name in check.weights):
         return (TRUTH,)
-    first, *others = (scored[name].row for name in check.weights)
-    return () if all(comparable(first, other) for other in others) else (SAME_TARGETS,)
+    return () if len({scored[name].row.targets for name in check.weights}) == 1 else (SAME_TARGETS,)
 
 
 def _time_difference(check: Check, rows: Scores) -> Estimate:
@@ -172,11 +172,6 @@ def _time_difference(check: Check, rows: Scores) -> Estimate:
     gaps = [float(np.mean(rows[a].row.window_ms) - np.mean(rows[b].row.window_ms)) for a, b in check.pairs]
     several = len(gaps) > 1
     return Estimate(float(np.mean(gaps)), min(gaps) if several else np.nan, max(gaps) if several else np.nan)
-
-
-def _body(finding: Finding) -> tuple[Line, ...]:
-    head = Line(finding.claim.text, (_verdict_cell(finding.verdict), Cell(""), Cell("")))
-    return (head, *(_line(outcome) for outcome in finding.outcomes))
 
 
 def _line(outcome: Outcome) -> Line:

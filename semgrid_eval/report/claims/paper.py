@@ -1,6 +1,6 @@
 """The paper's class-wise table (supplement, Table A1), and how a run's trainings differ from its own."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 
@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.report.rows.load import Row, Run
+from semgrid_eval.report.rows.load import Run
 from semgrid_eval.scores.metrics.iou import category_iou
 
 PAPER_SETTINGS = {
@@ -54,22 +54,19 @@ def scaling(run: Run) -> str:
     trained = [row for row in rows if row.results[0].record.seed is not None]
     if not trained:
         return ""
-    found = [_difference(text, _values(trained, key), theirs) for key, (text, theirs) in PAPER_SETTINGS.items()]
+    settings = [result.settings for row in trained for result in row.results]
+    found = [
+        _difference(text, {each[key] for each in settings if key in each}, theirs)
+        for key, (text, theirs) in PAPER_SETTINGS.items()
+    ]
     found.append(_difference("repeats", {len(row.results) for row in trained}, PAPER_REPEATS))
     found.append(_difference("scored windows", {row.windows for row in rows}, PAPER_WINDOWS))
     sources = {log.dataset for log in run.record.logs}
     others = " and ".join(sorted(sources - {PAPER_DATASET}))
     place = "besides" if PAPER_DATASET in sources else "instead of"
     found.append(f"data {others} {place} Cityscapes" if others else "")
-    told = [text for text in found if text]
-    if not told:
-        return "Trained as the paper's supplement says."
-    return f"Scaled from the paper's supplement: {', '.join(told)}."
-
-
-def _values(rows: Sequence[Row], key: str) -> set[object]:
-    """Collect the values of a setting that results state."""
-    return {result.settings[key] for row in rows for result in row.results if key in result.settings}
+    told = ", ".join(filter(None, found))
+    return f"Scaled from the paper's supplement: {told}." if told else "Trained as the paper's supplement says."
 
 
 def _difference(text: str, ours: Iterable[object], theirs: float) -> str:

@@ -42,25 +42,15 @@ class Estimate:
 
 @dataclass(frozen=True)
 class RowScores:
-    """Figures of one row in one region.
-
-    Args:
-        row: the row.
-        metric: whose Q columns these are.
-        results: the S results behind them.
-        by_seed: (S, Q) figures of each result.
-        draws: (B, Q) of their mean, resampled.
-        totals: (S, *shape) sums over windows.
-        windows: how many windows have something to count in the region.
-    """
+    """Figures of one row in one region."""
 
     row: Row
-    metric: Metric
-    results: tuple[Result, ...]
-    by_seed: Floats
-    draws: Floats
-    totals: Counts
-    windows: int
+    metric: Metric  # whose Q columns these are
+    results: tuple[Result, ...]  # the S results behind them
+    by_seed: Floats  # (S, Q) figures of each result
+    draws: Floats  # (B, Q) of their mean, resampled
+    totals: Counts  # (S, *shape) sums over windows
+    windows: int  # how many windows have something to count in the region
 
     @cached_property
     def mean(self) -> dict[str, float]:

@@ -14,21 +14,13 @@ from semgrid_eval.scores.tidy import windows_with
 
 @dataclass(frozen=True)
 class ResultSums:
-    """What a metric counted for one result in one region.
-
-    Args:
-        result: the result.
-        recordings: (R,) names of those with something to count.
-        ratios: (R, K, 2) their numerators and denominators.
-        totals: (*shape) sums over windows.
-        windows: how many have something to count.
-    """
+    """What a metric counted for one result in one region."""
 
     result: Result
-    recordings: NDArray[np.str_]
-    ratios: Counts
-    totals: Counts
-    windows: int
+    recordings: NDArray[np.str_]  # (R,) names of those with something to count
+    ratios: Counts  # (R, K, 2) their numerators and denominators
+    totals: Counts  # (*shape) sums over windows
+    windows: int  # how many have something to count
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ def failures(runs: Sequence[Run]) -> list[Failure]:
     found = []
     for run in runs:
         found += [Failure("row", row.name, reason) for row in run.rows for reason in row.failures]
-        found += [Failure("log", path, reason) for path, reason in sorted(run.record.failed_logs.items())]
+        found += [Failure("log", *reason) for reason in sorted(run.record.failed_logs.items())]
     return found
 
 
@@ -93,11 +93,12 @@ def command_table(runs: Sequence[Run]) -> Table:
         "The command that makes each row again. A run keeps the results that its --out folder already holds; "
         "name another folder to start over."
     )
-    lines = [
-        Line(row.name, (Cell(row.record.label), Cell(_state(row)), Cell(_command(row, run, runs), tone="command")))
-        for run in runs
-        for row in run.rows
-    ]
+    lines = []
+    for run in runs:
+        for row in run.rows:
+            command = row_command(run.record.command, row.record.name, matrix_file(run, runs))
+            cells = (Cell(row.record.label), Cell(_state(row)), Cell(command, tone="command"))
+            lines.append(Line(row.name, cells))
     return plain_table("commands", caption, "Row", ("What it does", "Results", "Command"), lines)
 
 
@@ -119,10 +120,6 @@ def _state(row: Row) -> str:
         return "failed"
     trained = row.results[0].record.seed is not None
     return plural(len(row.results), "seed") if trained else "no training"
-
-
-def _command(row: Row, run: Run, runs: Sequence[Run]) -> str:
-    return row_command(run.record.command, row.record.name, matrix_file(run, runs))
 
 
 def log_table(runs: Sequence[Run]) -> Table:

@@ -66,13 +66,8 @@ def render_page(material: Material) -> str:
     found = headline(scores)
     rows = [entry.row for entry in scores.values()]
     examples = example_groups(runs, rows, found)
-    environment = Environment(
-        loader=PackageLoader("semgrid_eval.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    loader, strict = PackageLoader("semgrid_eval.report"), StrictUndefined
+    environment = Environment(loader=loader, autoescape=True, undefined=strict, trim_blocks=True, lstrip_blocks=True)
     environment.filters["svg_uri"] = lambda text: data_uri(text.encode(), "image/svg+xml")
     return environment.get_template("page.html.j2").render(
         style=Markup(class_style()) + _source("style.css") + _source("examples.css"),
@@ -112,18 +107,14 @@ def rows_without(parts: Parts, rows: Sequence[Row]) -> list[str]:
 
 def finding_view(tag: str, index: int, findings: Sequence[Finding]) -> dict[str, object]:
     """Make what the page shows of one run's findings."""
-    mine = [each for each in findings if each.run == tag]
-    return {
-        "tag": tag,
-        "sentence": sentence(mine),
-        "tested": finding_table(f"findings-{index}" if index else "findings", mine),
-        "missing": missing_table(f"not-run-{index}" if index else "not-run", mine),
-    }
+    mine, end = [each for each in findings if each.run == tag], f"-{index}" if index else ""
+    tested, missing = finding_table(f"findings{end}", mine), missing_table(f"not-run{end}", mine)
+    return {"tag": tag, "sentence": sentence(mine), "tested": tested, "missing": missing}
 
 
 def confusion_tables(scores: Scores, found: Headline | None) -> list[Table]:
     """Make the confusion tables of the best row and of the baseline it is measured against."""
-    rows = [] if found is None else [row for row in (found.best, found.reference or found.rival) if row is not None]
+    rows = () if found is None else filter(None, (found.best, found.reference or found.rival))
     return [confusion_table(scores[row.name], f"confusion-{i}") for i, row in enumerate(rows)]
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -153,13 +154,12 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
         InputError: a run's record is missing or malformed. Faulty results are failures of their rows instead.
     """
     records = [read_run(folder) for folder in folders]
-    total, done, runs = sum(len(record.rows) for record in records), 0, []
+    total, done, runs = sum(len(record.rows) for record in records), count(1), []
     for folder, tag, record in zip(folders, _tags(folders), records, strict=True):
         rows, load = [], _Loader(folder, {log.path: log.group for log in record.logs})
         for row in record.rows:
             rows.append(load.row(row, f"{row.name} ({tag})" if tag else row.name))
-            done += 1
-            progress(done, total, row.name)
+            progress(next(done), total, row.name)
         runs.append(Run(folder, tag, record, tuple(rows)))
     return tuple(runs)
 
@@ -178,10 +178,7 @@ def _flat(config: Mapping[str, object], prefix: str = "") -> dict[str, Any]:
     """Flatten nested settings to dotted names."""
     found: dict[str, Any] = {}
     for key, value in config.items():
-        if isinstance(value, Mapping):
-            found |= _flat(value, f"{prefix}{key}.")
-        else:
-            found[f"{prefix}{key}"] = value
+        found |= _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
     return found
 
 

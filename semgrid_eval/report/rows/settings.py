@@ -63,8 +63,7 @@ class Varied:
     @property
     def reach(self) -> float:
         """From the smallest to the largest value of the first setting."""
-        values = [self.value(entry) for entry in self.rows]
-        return float(max(values) - min(values))
+        return float(np.ptp([self.value(entry) for entry in self.rows]))
 
     def lines(self) -> list[list[RowScores]]:
         """Return the rows of each value of the second setting, ordered by the first."""
@@ -102,8 +101,11 @@ def _sets(entries: Sequence[RowScores]) -> Iterator[Varied]:
             # Rows that mean the same are one point.
             groups.setdefault(rest, {}).setdefault(tuple(mine.get(key) for key in keys), entry)
         for group in groups.values():
-            if _is_curve(list(group)):
-                yield Varied(_along_first(keys, list(group)), tuple(group.values()))
+            distinct = [len(set(values)) for values in zip(*group, strict=True)]
+            # Points differ in each setting, and some of them in one setting only.
+            if min(distinct) > 1 and (len(distinct) == 1 or len(group) > max(distinct)):
+                along = keys if distinct[0] == max(distinct) else keys[::-1]
+                yield Varied(along, tuple(group.values()))
 
 
 def _varying(settings: Sequence[dict[str, object]]) -> list[str]:
@@ -115,15 +117,3 @@ def _varying(settings: Sequence[dict[str, object]]) -> list[str]:
         and all(isinstance(each.get(key), int | float) and not isinstance(each[key], bool) for each in settings)
         and len({each[key] for each in settings}) > 1
     ]
-
-
-def _is_curve(points: Sequence[tuple[Any, ...]]) -> bool:
-    """Tell whether points differ in each setting, and some of them in one setting only."""
-    distinct = [len(set(values)) for values in zip(*points, strict=True)]
-    return min(distinct) > 1 and (len(distinct) == 1 or len(points) > max(distinct))
-
-
-def _along_first(keys: Keys, points: Sequence[tuple[Any, ...]]) -> Keys:
-    """Put the setting with more values first."""
-    distinct = [len(set(values)) for values in zip(*points, strict=True)]
-    return keys if distinct[0] == max(distinct) else keys[::-1]

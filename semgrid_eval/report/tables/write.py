@@ -54,9 +54,9 @@ def write_tables(folder: Path, tables: Sequence[Table]) -> None:
     for table in tables:
         for end, written in FORMATS.items():
             write_text(folder / "tables" / f"{table.name}.{end}", written(table))
-    for table in (table for table in tables if table.name == "categories"):
-        for end in ("md", "tex"):
-            write_text(folder / f"summary.{end}", FORMATS[end](table))
+        if table.name == "categories":
+            for end in ("md", "tex"):
+                write_text(folder / f"summary.{end}", FORMATS[end](table))
 
 
 def write_figures(folder: Path, figures: Mapping[str, Sequence[Plot]]) -> None:

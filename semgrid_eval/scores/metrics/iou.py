@@ -93,8 +93,7 @@ def confusion(target: NDArray[np.uint8], prediction: NDArray[np.uint8], mask: ND
     if max(target.max(initial=0), prediction.max(initial=0)) >= CLASS_COUNT:
         raise ValueError(f"class ids must be below {CLASS_COUNT}")
     codes = target.astype(np.int64) * CLASS_COUNT + prediction
-    counts = Regions(np.where(mask, -1, 0), 1).tally(codes, CLASS_COUNT**2)
-    return counts.reshape(len(target), CLASS_COUNT, CLASS_COUNT)
+    return Regions(np.where(mask, -1, 0), 1).tally(codes, CLASS_COUNT**2).reshape(-1, CLASS_COUNT, CLASS_COUNT)
 
 
 def class_iou(counts: Counts) -> Floats:

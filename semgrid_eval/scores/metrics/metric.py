@@ -15,25 +15,15 @@ Grid = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class ScoredWindows:
-    """N windows and what a model says of them.
+    """N windows and what a model says of them."""
 
-    Args:
-        target: (N, H, W) class ids.
-        prediction: (N, H, W) class ids, the mask M treated as the row asks.
-        certainty: (N, H, W) of the prediction, 255 = 1.
-        left_out: (N, H, W) bool, cells that do not count.
-        inputs: (N, S, T, H, W) class ids, oldest first, moved into the target's place.
-        actors: (N, H, W) flags of true actors, `STANDING` and `MOVING`; None where no log holds the truth.
-        spec: extent of the grids.
-    """
-
-    target: Grid
-    prediction: Grid
-    certainty: Grid
-    left_out: NDArray[np.bool_]
-    inputs: Grid
-    actors: Grid | None
-    spec: GridSpec
+    target: Grid  # (N, H, W) class ids
+    prediction: Grid  # (N, H, W) class ids, the mask M treated as the row asks
+    certainty: Grid  # (N, H, W) of the prediction, 255 = 1
+    left_out: NDArray[np.bool_]  # (N, H, W) bool, cells that do not count
+    inputs: Grid  # (N, S, T, H, W) class ids, oldest first, moved into the target's place
+    actors: Grid | None  # (N, H, W) flags of true actors, `STANDING` and `MOVING`; None where no log holds the truth
+    spec: GridSpec  # extent of the grids
 
 
 @dataclass(frozen=True)

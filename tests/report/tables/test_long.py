@@ -6,10 +6,9 @@ from semgrid_eval.report.estimates.resampling import Resampling
 from semgrid_eval.report.estimates.table import divisions
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables.long import SUMMARY_COLUMNS, division_records, seed_frame, summary_frame
-from semgrid_eval.scores.tidy import FIGURE_COLUMNS
 from semgrid_eval.scores.metrics.table import METRICS
 from semgrid_eval.scores.regions.table import PARTITIONS
-from semgrid_eval.scores.tidy import load_figures
+from semgrid_eval.scores.tidy import FIGURE_COLUMNS, load_figures
 
 
 @pytest.fixture(scope="module")
