@@ -86,17 +86,15 @@ class RowFacts(Config):
 class ResultRecord(Config):
     """One scored predictor with one seed.
 
-    Args:
-        targets: digest of target windows, of what makes their grids, mask mode and split. Results are subtracted from
-            each other only where it is equal.
-        lead_s: median time from the newest input to the target.
+    `targets` is a digest of target windows, of what makes their grids, mask mode and split. Results are subtracted from
+    each other only where it is equal.
     """
 
     format_version: int
     id: str
     facts: RowFacts
     targets: str
-    lead_s: float
+    lead_s: float  # median time from the newest input to the target
     config: dict[str, object]
     log_digests: tuple[str, ...]
     seed: int | None  # None: the predictor does not depend on chance

@@ -40,18 +40,14 @@ class FramePictures:
 class Track:
     """Where vehicle and camera are at each frame of a log.
 
-    Args:
-        start_ns: when the log begins.
-        stamps_ns: (F,) times of all frames.
-        poses: (F, 3) x and y (m) and yaw (rad) of the vehicle there, in the log's odom frame, as grids are moved by.
-        projection: (3, 4) takes points in the vehicle frame (x, y, z, 1) to the image (w u, w v, w), u and v going
-            from 0 at its left and upper edge to 1 at its right and lower one, w being the depth in metres.
+    The projection takes points in the vehicle frame (x, y, z, 1) to the image (w u, w v, w), u and v going from 0 at
+    its left and upper edge to 1 at its right and lower one, w being the depth in metres.
     """
 
-    start_ns: int
-    stamps_ns: NDArray[np.int64]
-    poses: NDArray[np.float64]
-    projection: NDArray[np.float64]
+    start_ns: int  # when the log begins
+    stamps_ns: NDArray[np.int64]  # (F,) of all frames
+    poses: NDArray[np.float64]  # (F, 3) x and y (m), yaw (rad) of the vehicle in the log's odom frame, as grids move by
+    projection: NDArray[np.float64]  # (3, 4)
 
 
 @dataclass(frozen=True, eq=False)

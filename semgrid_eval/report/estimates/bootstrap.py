@@ -14,16 +14,12 @@ from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.estimates.resampling import DRAWS, Draws, Resampling
 from semgrid_eval.report.estimates.sums import RowSums, row_sums
 from semgrid_eval.report.rows.load import Result, Row, comparable
-from semgrid_eval.scores.metrics import iou
 from semgrid_eval.scores.metrics.metric import Counts, Floats, Metric, column_names, mean_finite
 from semgrid_eval.scores.metrics.table import IOU, METRICS
 
 LEVEL = 0.95
-CATEGORY_COLUMNS, MERGED_COLUMNS = iou.CATEGORY_COLUMNS, iou.MERGED_COLUMNS
-COLUMNS = column_names(IOU)
-"""Everything that is scored by IoU: the classes, the categories, and the categories with their classes merged."""
 LABELS = {column.name: column.label for column in IOU.columns}
-"""Each of `COLUMNS` in words."""
+"""Every figure of IoU in words: the classes, the categories, and the categories with their classes merged."""
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.report.estimates.bootstrap import (
-    CATEGORY_COLUMNS,
-    LABELS,
-    MERGED_COLUMNS,
-    Everything,
-    Parts,
-    RowScores,
-    Scores,
-)
+from semgrid_eval.report.estimates.bootstrap import LABELS, Everything, Parts, RowScores, Scores
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.rows.load import Result
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS
@@ -26,6 +18,7 @@ from semgrid_eval.report.tables.values import (
     side_by_side,
     value_table,
 )
+from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS, MERGED_COLUMNS
 from semgrid_eval.scores.metrics.metric import Floats, Metric, divided
 from semgrid_eval.scores.metrics.table import IOU, METRICS
 
