@@ -9,16 +9,7 @@ from matplotlib.figure import Figure
 from semgrid_eval.classes import CATEGORY_NAMES
 from semgrid_eval.report.claims.paper import paper_value
 from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
-from semgrid_eval.report.figures.style import (
-    PALETTE,
-    PAPER_MARKS,
-    SETTINGS,
-    Plot,
-    evidence,
-    finish,
-    paper_note,
-    short,
-)
+from semgrid_eval.report.figures.style import PALETTE, PAPER_MARKS, SETTINGS, Plot, evidence, finish, paper_note, short
 from semgrid_eval.report.rows.settings import settings_but
 
 

@@ -11,13 +11,7 @@ from semgrid_eval.report.rows.load import Result
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS
 from semgrid_eval.report.tables.changes import changes_table, not_compared_table
 from semgrid_eval.report.tables.table import ABSENT, Cell, Line, Table, plain_cell, plain_table, plural
-from semgrid_eval.report.tables.values import (
-    difference_table,
-    run_differences,
-    seeds,
-    side_by_side,
-    value_table,
-)
+from semgrid_eval.report.tables.values import difference_table, run_differences, seeds, side_by_side, value_table
 from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS, MERGED_COLUMNS
 from semgrid_eval.scores.metrics.metric import Floats, Metric, divided
 from semgrid_eval.scores.metrics.table import IOU, METRICS
