@@ -22,19 +22,12 @@ MaskMode = Literal["exclude", "substitute", "off"]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What is left of a model's answers.
+    """What is left of a model's answers."""
 
-    Args:
-        sums: what every metric counted, (N, regions, ...), by the names of metric and partition.
-        prediction: (N, H, W) uint8 class ids.
-        certainty: (N, H, W) uint8, the highest score of each cell, 255 = 1.
-        seconds: time spent predicting, without gathering inputs.
-    """
-
-    sums: Sums
-    prediction: NDArray[np.uint8]
-    certainty: NDArray[np.uint8]
-    seconds: float
+    sums: Sums  # what every metric counted, (N, regions, ...), by the names of metric and partition
+    prediction: NDArray[np.uint8]  # (N, H, W) uint8 class ids
+    certainty: NDArray[np.uint8]  # (N, H, W) uint8, the highest score of each cell, 255 = 1
+    seconds: float  # time spent predicting, without gathering inputs
 
 
 def evaluate(
@@ -50,8 +43,8 @@ def evaluate(
 
     Args:
         model: sees the past of a batch and its motion alone.
-        windows: the windows to score.
-        mask_mode: how the cells of M are treated.
+        windows: what is scored.
+        mask_mode: how the cells of M are treated, see `apply_mask`.
         spec: extent of the grids; by default the vehicle is at the middle of the bottom edge.
         batch: windows at once.
         progress: told of each batch.

@@ -20,7 +20,7 @@ import re
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -34,6 +34,7 @@ from semgrid_eval.scores.metrics.table import METRICS, Sums
 from semgrid_eval.scores.regions.table import PARTITIONS
 
 FORMAT_VERSION = 2
+RUN_FILE, RESULT_FILE = "run.json", "result.json"
 SUMS_FILE = "sums.npz"
 PREDICTIONS_FILE = "predictions.npz"
 HISTORY_FILE = "history.csv"
@@ -60,7 +61,7 @@ class WindowRecord(Config):
     log: str
     target_frame: int
     target_stamp_ns: int
-    input_stamps_ns: tuple[int, ...] = ()  # oldest first; results of older versions have none
+    input_stamps_ns: tuple[int, ...]  # oldest first
 
     @property
     def drive(self) -> str:
@@ -69,45 +70,31 @@ class WindowRecord(Config):
 
 
 class RowFacts(Config):
-    """What a row is, whatever it is called: differences, pairs, curves and examples are formed by this alone.
+    """What a row is, whatever it is called: differences, pairs, curves and examples are formed by this alone."""
 
-    Args:
-        model: as the matrix names it: `ed`, `fuse`, `mine.py:Mine`.
-        family: of models, which figures draw alike: `ED`, `BL`, or that of a model of one's own.
-        learns: whether it was fitted to training windows, by counts or by gradient.
-        baseline: whether other rows are measured against it.
-        inputs: grids of the past, by sensor.
-        step_frames: frames between inputs.
-        horizon_steps: steps from the newest input to the target.
-        sensors: names of the inputs' sensors.
-        translate: whether inputs are moved into the target's place.
-    """
-
-    model: str
-    family: str
-    learns: bool
-    baseline: bool
-    inputs: int
-    step_frames: int
-    horizon_steps: int
-    sensors: tuple[str, ...]
-    translate: bool
+    model: str  # as the matrix names it: `ed`, `fuse`, `mine.py:Mine`
+    family: str  # of models, which figures draw alike: `ED`, `BL`, or that of a model of one's own
+    learns: bool  # whether it was fitted to training windows, by counts or by gradient
+    baseline: bool  # whether other rows are measured against it
+    inputs: int  # grids of the past, by sensor
+    step_frames: int  # frames between inputs
+    horizon_steps: int  # steps from the newest input to the target
+    sensors: tuple[str, ...]  # names of the inputs' sensors
+    translate: bool  # whether inputs are moved into the target's place
 
 
 class ResultRecord(Config):
     """One scored predictor with one seed.
 
-    Args:
-        targets: digest of target windows, of what makes their grids, mask mode and split. Results are subtracted from
-            each other only where it is equal.
-        lead_s: median time from the newest input to the target.
+    `targets` is a digest of target windows, of what makes their grids, mask mode and split. Results are subtracted from
+    each other only where it is equal.
     """
 
     format_version: int
     id: str
     facts: RowFacts
     targets: str
-    lead_s: float
+    lead_s: float  # median time from the newest input to the target
     config: dict[str, object]
     log_digests: tuple[str, ...]
     seed: int | None  # None: the predictor does not depend on chance
@@ -145,14 +132,17 @@ class RunRecord(Config):
     rows: tuple[RowRecord, ...]
 
 
-def run_file(run: Path) -> Path:
-    """Where the record of a run lies."""
-    return run / "run.json"
+R = TypeVar("R", RunRecord, ResultRecord)
 
 
 def result_folder(run: Path, result_id: str) -> Path:
     """Where a result lies."""
     return run / "results" / result_id
+
+
+def windows_file(run: Path, windows_id: str) -> Path:
+    """Where a set of windows lies."""
+    return run / "windows" / f"{windows_id}.npz"
 
 
 def scored_digest(run: RunRecord, result: ResultRecord, path: str) -> str | None:
@@ -164,27 +154,21 @@ def scored_digest(run: RunRecord, result: ResultRecord, path: str) -> str | None
     return found[-1] if found else None
 
 
-def windows_file(run: Path, windows_id: str) -> Path:
-    """Where a set of windows lies."""
-    return run / "windows" / f"{windows_id}.npz"
-
-
 def write_run(run: Path, record: RunRecord) -> None:
     """Write a run's record atomically."""
-    write_json(run_file(run), record.model_dump(mode="json"))
+    write_json(run / RUN_FILE, record.model_dump(mode="json"))
 
 
 def read_run(run: Path) -> RunRecord:
-    """Read a run's record.
-
-    Raises:
-        InputError: it is missing, malformed or of another format version.
-    """
-    if not run_file(run).is_file():
+    """Read a run's record; an InputError says that it is missing, malformed or of another format version."""
+    if not (run / RUN_FILE).is_file():
         raise ResultError("no run lies here (it has no run.json)", path=run)
-    record = parse_config(RunRecord, read_json(run_file(run)), path=run_file(run))
-    _check_version(record.format_version, run_file(run))
-    return record
+    return _record(RunRecord, run / RUN_FILE)
+
+
+def write_result(folder: Path, record: ResultRecord) -> None:
+    """Write a result's record."""
+    write_json(folder / RESULT_FILE, record.model_dump(mode="json"))
 
 
 def read_result(folder: Path) -> ResultRecord:
@@ -193,17 +177,10 @@ def read_result(folder: Path) -> ResultRecord:
     Raises:
         InputError: it is missing, malformed, of another format version or under another id's name.
     """
-    path = folder / "result.json"
-    record = parse_config(ResultRecord, read_json(path), path=path)
-    _check_version(record.format_version, path)
+    record = _record(ResultRecord, folder / RESULT_FILE)
     if record.id != folder.name:
-        raise ResultError(f"belongs to another folder than {folder.name}", path=path, field="id")
+        raise ResultError(f"belongs to another folder than {folder.name}", path=folder / RESULT_FILE, field="id")
     return record
-
-
-def write_result(folder: Path, record: ResultRecord) -> None:
-    """Write a result's record."""
-    write_json(folder / "result.json", record.model_dump(mode="json"))
 
 
 def is_done(folder: Path, *, with_predictions: bool = False, with_history: bool = False) -> bool:
@@ -221,18 +198,20 @@ def read_windows(run: Path, windows_id: str) -> dict[str, NDArray[Any]]:
     """Read `inputs` (moved to the target's time, also for rows that saw them not moved), `target` and `mask`.
 
     Raises:
-        ResultError: they are missing or damaged.
+        ResultError: they are missing or damaged; likewise below.
     """
     return read_arrays(windows_file(run, windows_id), ("inputs", "target", "mask"))
 
 
 def read_predictions(folder: Path) -> dict[str, NDArray[Any]]:
-    """Read what a result predicted: `prediction` and `certainty`.
-
-    Raises:
-        ResultError: they are missing or damaged.
-    """
+    """Read what a result predicted: `prediction` and `certainty`."""
     return read_arrays(folder / PREDICTIONS_FILE, ("prediction", "certainty"))
+
+
+def read_history(folder: Path) -> pd.DataFrame | None:
+    """Read the training history of a result, None where nothing was trained."""
+    path = folder / HISTORY_FILE
+    return pd.read_csv(path) if path.is_file() else None
 
 
 def write_sums(folder: Path, sums: Sums) -> None:
@@ -241,11 +220,7 @@ def write_sums(folder: Path, sums: Sums) -> None:
 
 
 def read_sums(folder: Path, metric: str, partition: str) -> NDArray[np.int32] | None:
-    """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions.
-
-    Raises:
-        ResultError: it is missing or malformed.
-    """
+    """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions."""
     return _read_sums(folder, [(metric, partition)]).get((metric, partition))
 
 
@@ -255,19 +230,6 @@ def check_sums(folder: Path, windows: int) -> None:
         if len(found) != windows:
             fault = f"has {len(found)} windows, and result.json {windows}"
             raise ResultError(fault, path=folder / SUMS_FILE, field=".".join(key))
-
-
-def read_counts(folder: Path) -> NDArray[np.int32]:
-    """Read the confusion counts of all cells of a result: (N, C, C); a ResultError says what is wrong with them."""
-    counts = read_sums(folder, "iou", "all")
-    assert counts is not None  # all cells are always counted
-    return counts[:, 0]
-
-
-def read_history(folder: Path) -> pd.DataFrame | None:
-    """Read the training history of a result, None where nothing was trained."""
-    path = folder / HISTORY_FILE
-    return pd.read_csv(path) if path.is_file() else None
 
 
 def _read_sums(folder: Path, keys: Sequence[tuple[str, str]]) -> dict[tuple[str, str], NDArray[np.int32]]:
@@ -283,8 +245,9 @@ def _read_sums(folder: Path, keys: Sequence[tuple[str, str]]) -> dict[tuple[str,
     return sums
 
 
-def _check_version(found: int, path: Path) -> None:
-    if found != FORMAT_VERSION:
-        raise ResultError(
-            f"{found} is not {FORMAT_VERSION}, which this version reads", path=path, field="format_version"
-        )
+def _record(kind: type[R], path: Path) -> R:
+    record = parse_config(kind, read_json(path), path=path)
+    if record.format_version != FORMAT_VERSION:
+        fault = f"{record.format_version} is not {FORMAT_VERSION}, which this version reads"
+        raise ResultError(fault, path=path, field="format_version")
+    return record

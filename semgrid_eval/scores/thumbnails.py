@@ -30,33 +30,24 @@ _TRACK = ("start_ns", "track_ns", "track", "projection")
 
 @dataclass(frozen=True)
 class FramePictures:
-    """The small pictures of one frame as files; empty where the log has none.
+    """The small pictures of one frame as files; empty where the log has none."""
 
-    Args:
-        image: the camera's image as WebP.
-        label: Cityscapes label ids as palette PNG.
-    """
-
-    image: bytes = b""
-    label: bytes = b""
+    image: bytes = b""  # the camera's, as WebP
+    label: bytes = b""  # Cityscapes label ids as palette PNG
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
     """Where vehicle and camera are at each frame of a log.
 
-    Args:
-        start_ns: when the log begins.
-        stamps_ns: (F,) times of all frames.
-        poses: (F, 3) x and y (m) and yaw (rad) of the vehicle there, in the log's odom frame, as grids are moved by.
-        projection: (3, 4) takes points in the vehicle frame (x, y, z, 1) to the image (w u, w v, w), u and v going
-            from 0 at its left and upper edge to 1 at its right and lower one, w being the depth in metres.
+    The projection takes points in the vehicle frame (x, y, z, 1) to the image (w u, w v, w), u and v going from 0 at
+    its left and upper edge to 1 at its right and lower one, w being the depth in metres.
     """
 
-    start_ns: int
-    stamps_ns: NDArray[np.int64]
-    poses: NDArray[np.float64]
-    projection: NDArray[np.float64]
+    start_ns: int  # when the log begins
+    stamps_ns: NDArray[np.int64]  # (F,) of all frames
+    poses: NDArray[np.float64]  # (F, 3) x and y (m), yaw (rad) of the vehicle in the log's odom frame, as grids move by
+    projection: NDArray[np.float64]  # (3, 4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,29 +66,17 @@ def pictures_file(run: Path, log_digest: str, grid: GridConfig) -> Path:
 
 
 def write_pictures(path: Path, kept: LogPictures) -> None:
-    """Write what is kept of a log atomically, equal things giving equal bytes.
-
-    Raises:
-        InputError: the folder cannot be written to.
-    """
+    """Write what is kept of a log atomically, equal things giving equal bytes; an InputError says why it cannot."""
     stamps_ns = sorted(kept.frames)
     images, image_ends = _joined([kept.frames[stamp].image for stamp in stamps_ns])
     labels, label_ends = _joined([kept.frames[stamp].label for stamp in stamps_ns])
-    track = kept.track
-    arrays: dict[str, NDArray[Any]] = {
-        "stamps_ns": np.array(stamps_ns, np.int64),
-        **dict(zip(_FILES, (images, image_ends, labels, label_ends), strict=True)),
-        **dict(zip(_TRACK, (np.array([track.start_ns]), track.stamps_ns, track.poses, track.projection), strict=True)),
-    }
-    write_arrays(path, arrays)
+    track = (np.array([kept.track.start_ns]), kept.track.stamps_ns, kept.track.poses, kept.track.projection)
+    values = (np.array(stamps_ns, np.int64), images, image_ends, labels, label_ends, *track)
+    write_arrays(path, dict(zip(("stamps_ns", *_FILES, *_TRACK), values, strict=True)))
 
 
 def read_pictures(path: Path) -> LogPictures:
-    """Read what is kept of a log.
-
-    Raises:
-        ResultError: it is missing or malformed.
-    """
+    """Read what is kept of a log; a ResultError says that it is missing or malformed."""
     arrays = read_arrays(path, ("stamps_ns", *_FILES, *_TRACK))
     stamps_ns = _checked(arrays, "stamps_ns", (-1,), np.int64, path).tolist()
     images = _cut(arrays, "images", "image_ends", path)
@@ -109,11 +88,7 @@ def read_pictures(path: Path) -> LogPictures:
 
 
 def read_track(path: Path) -> Track:
-    """Read the track alone of what is kept of a log.
-
-    Raises:
-        ResultError: it is missing or malformed.
-    """
+    """Read the track alone of what is kept of a log; a ResultError says that it is missing or malformed."""
     return _track(read_arrays(path, _TRACK), path)
 
 
@@ -141,9 +116,7 @@ def _checked(
 ) -> NDArray[Any]:
     """Return an array that has the shape, -1 standing for any length, and the type that it should, and is finite."""
     values = arrays[name]
-    fits = len(values.shape) == len(shape) and all(
-        wanted in (-1, found) for wanted, found in zip(shape, values.shape, strict=True)
-    )
+    fits = values.ndim == len(shape) and all(map(lambda wanted, found: wanted in (-1, found), shape, values.shape))
     if not fits or values.dtype != kind or not np.isfinite(values).all():
         raise ResultError(f"has shape {values.shape}, type {values.dtype}, or is not finite", path=path, field=name)
     return values

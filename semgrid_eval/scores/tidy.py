@@ -1,6 +1,7 @@
 """A run as data frames of one line for each number, made result by result."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,10 +39,7 @@ def load_figures(
 ) -> pd.DataFrame:
     """Return every figure of a run, pooled over the windows of a result: `FIGURE_COLUMNS`.
 
-    Args:
-        run: its folder.
-        metrics: names of `METRICS`, all by default.
-        partitions: names of `PARTITIONS`, all by default.
+    Metrics and partitions are names of `METRICS` and `PARTITIONS`, all by default.
 
     Raises:
         InputError: the run or a result of it cannot be read.
@@ -62,7 +60,11 @@ def tidy(
         InputError: the run or a result of it cannot be read.
     """
     for counted in _counted(run, metrics, partitions):
-        yield _windows(counted)
+        ratios = counted.metric.ratios(counted.sums.astype(np.int64))  # (N, regions, K, 2)
+        frame = _product(window=range(len(ratios)), region=counted.partition.regions, ratio=counted.metric.ratio_names)
+        recordings = np.array([window.recording for window in counted.record.windows])
+        frame = counted.keyed(frame.assign(recording=recordings[frame.window]))[list(WINDOW_COLUMNS)]
+        yield frame.assign(numerator=ratios[..., 0].ravel(), denominator=ratios[..., 1].ravel())
 
 
 def windows_with(sums: NDArray[np.integer]) -> NDArray[np.bool_]:
@@ -70,37 +72,24 @@ def windows_with(sums: NDArray[np.integer]) -> NDArray[np.bool_]:
     return np.asarray(sums.reshape(*sums.shape[:2], -1).any(axis=2))
 
 
-def pooled(sums: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Sum over windows: (N, ...) -> (...)."""
-    return np.asarray(sums.sum(axis=0, dtype=np.int64))
-
-
 def _counted(run: Path, metrics: Sequence[str] | None, partitions: Sequence[str] | None) -> Iterator[_Counted]:
     for row in read_run(run).rows:
         for result_id in row.results:
             folder = result_folder(run, result_id)
             record = read_result(folder)
-            for metric in metrics or METRICS:
-                for partition in partitions or PARTITIONS:
-                    sums = read_sums(folder, metric, partition)
-                    if sums is not None:
-                        yield _Counted(row.name, record, METRICS[metric], PARTITIONS[partition], sums)
+            for metric, partition in product(metrics or METRICS, partitions or PARTITIONS):
+                if (sums := read_sums(folder, metric, partition)) is not None:
+                    yield _Counted(row.name, record, METRICS[metric], PARTITIONS[partition], sums)
 
 
 def _figures(counted: _Counted) -> pd.DataFrame:
-    metric, regions, sums = counted.metric, counted.partition.regions, pooled(counted.sums)
-    frame = pd.MultiIndex.from_product([regions, column_names(metric)], names=["region", "column"]).to_frame(
-        index=False
-    )
+    metric, sums = counted.metric, counted.sums.sum(axis=0, dtype=np.int64)
+    frame = _product(region=counted.partition.regions, column=column_names(metric))
     windows = np.repeat(windows_with(counted.sums).sum(axis=0), len(metric.columns))
     values, cells = metric.figures(metric.ratios(sums)).ravel(), metric.cells(sums).ravel()
     return counted.keyed(frame.assign(value=values, cells=cells, windows=windows))[list(FIGURE_COLUMNS)]
 
 
-def _windows(counted: _Counted) -> pd.DataFrame:
-    ratios = counted.metric.ratios(counted.sums.astype(np.int64))  # (N, regions, K, 2)
-    places = [range(len(counted.sums)), counted.partition.regions, counted.metric.ratio_names]
-    frame = pd.MultiIndex.from_product(places, names=["window", "region", "ratio"]).to_frame(index=False)
-    recordings = np.array([window.recording for window in counted.record.windows])
-    frame = counted.keyed(frame.assign(recording=recordings[frame.window]))[list(WINDOW_COLUMNS)]
-    return frame.assign(numerator=ratios[..., 0].ravel(), denominator=ratios[..., 1].ravel())
+def _product(**levels: Sequence[Hashable]) -> pd.DataFrame:
+    """Return a line for each combination of the levels' values, the last level running fastest."""
+    return pd.MultiIndex.from_product([*levels.values()], names=[*levels]).to_frame(index=False)

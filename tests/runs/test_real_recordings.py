@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from semgrid_eval.cli.main import cli
 from semgrid_eval.scores.metrics.iou import category_iou, class_iou
-from semgrid_eval.scores.results import read_counts, read_run, result_folder
+from semgrid_eval.scores.results import read_run, read_sums, result_folder
 
 REAL = os.environ.get("SEMGRID_REAL_DATA", "")
 MATRIX = {
@@ -34,6 +34,6 @@ def test_aligning_beats_repeating_and_fusing_beats_both(tmp_path):
         assert result.return_value == 0, result.output
     score = {}
     for row in read_run(tmp_path / "run").rows:
-        counts = read_counts(result_folder(tmp_path / "run", row.results[0]))
+        counts = read_sums(result_folder(tmp_path / "run", row.results[0]), "iou", "all")[:, 0]
         score[row.name] = category_iou(class_iou(counts.sum(axis=0)))["mean_known"]
     assert score["BL-Fuse"] > score["BL-DC"] > score["BL-NT"] + 0.02

@@ -25,7 +25,7 @@ def logs(tmp_path_factory):
 def score(out, record, name):
     row = next(row for row in record.rows if row.name == name)
     assert row.failure is None, row.failure
-    counts = results.read_counts(results.result_folder(out, row.results[0]))
+    counts = results.read_sums(results.result_folder(out, row.results[0]), "iou", "all")[:, 0]
     return float(category_iou(class_iou(counts.sum(axis=0)))["mean_known"])
 
 
@@ -64,7 +64,7 @@ def test_a_run_leaves_results_that_parse_and_belong_together(logs, tmp_path):
         windows = results.read_windows(out, result.windows_id)
         assert windows["inputs"].shape == (2, len(row.facts.sensors), 2, 128, 128)
         predictions = results.read_predictions(folder)
-        counts = results.read_counts(folder)
+        counts = results.read_sums(folder, "iou", "all")[:, 0]
         for n in range(2):
             scored = ~windows["mask"][n]
             for class_id in range(len(CLASS_NAMES)):
@@ -198,7 +198,7 @@ def test_several_processes_give_the_same_bytes_as_one(logs, tmp_path):
 def test_mask_modes_differ_in_the_row_of_unknown_only(logs, tmp_path, mode):
     record = run([{"name": "BL-DC", "model": "newest", "mask_mode": mode}], logs, tmp_path / "run")
     folder = results.result_folder(tmp_path / "run", record.rows[0].results[0])
-    counts = results.read_counts(folder)
+    counts = results.read_sums(folder, "iou", "all")[:, 0]
     windows_id = results.read_result(folder).windows_id
     windows = results.read_arrays(results.windows_file(tmp_path / "run", windows_id), ("mask", "target"))
     prediction = results.read_arrays(folder / "predictions.npz", ("prediction",))["prediction"]

@@ -12,7 +12,6 @@ from semgrid_eval.scores.results import (
     RunRecord,
     check_sums,
     is_done,
-    read_counts,
     read_sums,
     scored_digest,
     write_sums,
@@ -27,7 +26,7 @@ def test_sums_come_back_as_they_were_written(tmp_path):
     write_sums(tmp_path, counted())
     for (metric, partition), sums in counted().items():
         np.testing.assert_array_equal(read_sums(tmp_path, metric, partition), sums)
-    np.testing.assert_array_equal(read_counts(tmp_path), counted()["iou", "all"][:, 0])
+    np.testing.assert_array_equal(read_sums(tmp_path, "iou", "all")[:, 0], counted()["iou", "all"][:, 0])
     check_sums(tmp_path, 3)
 
 
@@ -64,7 +63,7 @@ def test_sums_of_a_metric_that_is_not_there_are_named(tmp_path):
 
 def test_missing_sums_are_named(tmp_path):
     with pytest.raises(ResultError, match=r"sums\.npz: cannot be read"):
-        read_counts(tmp_path)
+        read_sums(tmp_path, "iou", "all")
 
 
 @pytest.mark.parametrize(("path", "expected"), [("a.mcap", "scored"), ("b.mcap", "other"), ("c.mcap", None)])

@@ -8,7 +8,7 @@ from support.fake_run import FakeRow, make_fake_run
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.scores.metrics.table import METRICS
 from semgrid_eval.scores.regions.table import PARTITIONS
-from semgrid_eval.scores.results import read_counts, read_run, result_folder
+from semgrid_eval.scores.results import read_run, read_sums, result_folder
 from semgrid_eval.scores.tidy import load_figures, tidy
 
 
@@ -29,7 +29,7 @@ def test_every_figure_of_every_result_is_there_once(run):
 
 def test_figures_are_those_of_the_pooled_counts(run):
     result = read_run(run).rows[1].results[1]
-    counts = read_counts(result_folder(run, result)).sum(axis=0)
+    counts = read_sums(result_folder(run, result), "iou", "all")[:, 0].sum(axis=0)
     car = CLASS_NAMES.index("car")
     figures = load_figures(run, metrics=["iou"], partitions=["all"]).set_index(["row", "seed", "column"])
     line = figures.loc[("ED-DC", 1, "car")]

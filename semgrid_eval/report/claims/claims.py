@@ -25,29 +25,20 @@ _DEFAULT_ENDS = {"deeper": ("ED-d4-f64", "ED-d2-f64"), "wider": ("ED-d3-f64", "E
 
 @dataclass(frozen=True)
 class Check:
-    """One comparison: the mean over pairs of the first row's score minus the second's.
-
-    Args:
-        pairs: names of rows.
-        score: a column of scores, or `WINDOW_MS`.
-        rule: what has to hold of the difference and its interval.
-        over: a pair whose difference is taken off, where leads are compared.
-        region: `moving` where only the cells near moving actors count.
-    """
+    """One comparison: the mean over pairs of rows of the first one's score minus the second's."""
 
     pairs: tuple[Pair, ...]
-    score: str
-    rule: Rule = "better"
-    over: Pair | None = None
-    region: str = ""
+    score: str  # a column of scores, or `WINDOW_MS`
+    rule: Rule = "better"  # what has to hold of the difference and its interval
+    over: Pair | None = None  # a pair whose difference is taken off, where leads are compared
+    region: str = ""  # `moving` where only the cells near moving actors count
 
     @property
     def weights(self) -> dict[str, float]:
         """The weight of each row's score."""
-        weights = {
-            name: sign / len(self.pairs) for pair in self.pairs for sign, name in zip((1, -1), pair, strict=True)
-        }
-        return weights | ({} if self.over is None else {self.over[0]: -1.0, self.over[1]: 1.0})
+        share = 1 / len(self.pairs)
+        weights = {name: sign for pair in self.pairs for name, sign in zip(pair, (share, -share), strict=True)}
+        return weights | dict(zip(self.over or (), (-1.0, 1.0), strict=False))
 
     @property
     def text(self) -> str:
@@ -69,32 +60,26 @@ class Claim:
 
 def claims(rows: Iterable[str]) -> tuple[Claim, ...]:
     """List the claims; which networks stand for deeper and wider depends on the names of the rows at hand."""
+    builds = [(name, int(found[1]), int(found[2])) for name in rows if (found := _BUILD.fullmatch(name))]
+    third = f"With a third input, ED-SL3 is at least equal to ED-SL2 (at most {MARGIN} IoU below)"
     return (
         *(claim for baseline in _BASELINES for claim in _over(baseline)),
         *_without_translation(),
         *_several_sensors(),
-        Claim(
-            "third-input",
-            f"With a third input, ED-SL3 is at least equal to ED-SL2 (at most {MARGIN} IoU below)",
-            _each((*_LARGE, *_SMALL), ("ED-SL3", "ED-SL2"), rule="at least"),
-        ),
+        Claim("third-input", third, _each((*_LARGE, *_SMALL), ("ED-SL3", "ED-SL2"), rule="at least")),
         *_horizons(),
-        *_builds([(name, int(found[1]), int(found[2])) for name in rows if (found := _BUILD.fullmatch(name))]),
+        *_builds(builds),
     )
 
 
 def _over(baseline: str) -> tuple[Claim, ...]:
     pair = ("ED-DC", baseline)
+    large = f"ED-DC is better than {baseline} on static classes and vehicles"
+    moving = f"ED-DC is better than {baseline} on moving vehicles alone"
     small = f"ED-DC is at least equal to {baseline} on small classes (at most {MARGIN} IoU below)"
     return (
-        Claim(
-            f"large-{baseline}", f"ED-DC is better than {baseline} on static classes and vehicles", _each(_LARGE, pair)
-        ),
-        Claim(
-            f"moving-{baseline}",
-            f"ED-DC is better than {baseline} on moving vehicles alone",
-            (Check((pair,), "vehicles", region="moving"),),
-        ),
+        Claim(f"large-{baseline}", large, _each(_LARGE, pair)),
+        Claim(f"moving-{baseline}", moving, (Check((pair,), "vehicles", region="moving"),)),
         Claim(f"small-{baseline}", small, _each(_SMALL, pair, rule="at least")),
     )
 
@@ -110,25 +95,23 @@ def _without_translation() -> tuple[Claim, ...]:
 def _several_sensors() -> tuple[Claim, ...]:
     good = f"Fusing two sensors, ED-Sp1 is as good as ED-DC with one (within {MARGIN} IoU)"
     lead = f"ED-Sp2 is as far above BL-Sp2 as ED-DC above BL-DC, or farther (at most {MARGIN} IoU less)"
+    larger = "On static classes, ED-Sp2's lead over its baseline is larger than ED-DC's"
     far, near = ("ED-Sp2", "BL-Sp2"), ("ED-DC", "BL-DC")
-    static = Check((far,), "static_known", over=near)
     return (
         Claim("two-sensors", good, _each((*_LARGE, *_SMALL), ("ED-Sp1", "ED-DC"), rule="close")),
-        Claim("blind-band", "With a blind band, ED-Sp2 is below ED-DC", (Check((("ED-DC", "ED-Sp2"),), _MEAN),)),
+        Claim("blind-band", "With a blind band, ED-Sp2 is below ED-DC", _each((_MEAN,), ("ED-DC", "ED-Sp2"))),
         Claim("blind-band-lead", lead, (Check((far,), _MEAN, "at least", over=near),)),
-        Claim(
-            "blind-band-static", "On static classes, ED-Sp2's lead over its baseline is larger than ED-DC's", (static,)
-        ),
+        Claim("blind-band-static", larger, (Check((far,), "static_known", over=near),)),
     )
 
 
 def _horizons() -> tuple[Claim, ...]:
-    falls = tuple(Check(((f"ED-{sooner}", f"ED-{later}"),), _MEAN) for sooner, later in itertools.pairwise(_HORIZONS))
-    stays = [_each(_LARGE, (f"ED-{horizon}", f"BL-{horizon}")) for horizon in _HORIZONS[1:]]
+    falls = [Check(((f"ED-{sooner}", f"ED-{later}"),), _MEAN) for sooner, later in itertools.pairwise(_HORIZONS)]
+    stays = [check for horizon in _HORIZONS[1:] for check in _each(_LARGE, (f"ED-{horizon}", f"BL-{horizon}"))]
     above = "At longer horizons, ED stays better than its baseline on static classes and vehicles"
     return (
-        Claim("horizon-falls", "ED's scores fall with the horizon", falls),
-        Claim("horizon-lead", above, tuple(check for checks in stays for check in checks)),
+        Claim("horizon-falls", "ED's scores fall with the horizon", tuple(falls)),
+        Claim("horizon-lead", above, tuple(stays)),
     )
 
 

@@ -10,8 +10,19 @@ import pandas as pd
 
 from semgrid_eval.report.claims.claims import MARGIN, WINDOW_MS, Check, Claim, Rule, claims
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores, Scores, weighted_sum
-from semgrid_eval.report.rows.load import Run, comparable
-from semgrid_eval.report.tables.table import ABSENT, MINUS, Cell, Line, Table, difference_cell, interval_phrase, plural
+from semgrid_eval.report.rows.load import Run
+from semgrid_eval.report.tables.table import (
+    ABSENT,
+    MINUS,
+    Cell,
+    Line,
+    Table,
+    difference_cell,
+    finite,
+    interval_phrase,
+    plain_table,
+    plural,
+)
 
 TRUTH = "logs that tell where true actors move"
 SAME_TARGETS = "rows with the same targets"
@@ -28,16 +39,13 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """A comparison with its numbers: IoU with the paired interval, or milliseconds with the range over pairs of rows.
-
-    Without the rows it needs, it has no number and names what is missing.
-    """
+    """A comparison with its numbers: IoU with the paired interval, or milliseconds with the range over pairs."""
 
     check: Check
     verdict: Verdict
     difference: Estimate
     windows: int
-    missing: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()  # what it needs, where it has no number
 
 
 @dataclass(frozen=True)
@@ -64,8 +72,7 @@ def find(runs: Sequence[Run], scores: Scores, regions: Mapping[str, Scores]) -> 
     """Test every claim on every run, from the scores of all cells and of those near moving and standing actors."""
     found = []
     for run in runs:
-        places = {"": _by_record(scores, run)}
-        places |= {name: _by_record(near, run) for name, near in regions.items()}
+        places = {name: _by_record(each, run) for name, each in {"": scores, **regions}.items()}
         for claim in claims(places[""]):
             found.append(Finding(run.tag, claim, tuple(_outcome(check, places) for check in claim.checks)))
     return found
@@ -89,18 +96,19 @@ def sentence(findings: Sequence[Finding]) -> str:
     tested = len(findings) - count[Verdict.NOT_RUN]
     if not tested:
         return f"This run lacks the rows to test any of the {plural(len(findings), 'claim')}."
-    words = (
-        (Verdict.HOLDS, "holds", "hold"),
-        (Verdict.FAILS, "does not", "do not"),
-        (Verdict.OPEN, "is undecided", "are undecided"),
-    )
-    parts = ", ".join(f"{count[kind]} {one if count[kind] == 1 else many}" for kind, one, many in words)
+    one = {Verdict.HOLDS: "holds", Verdict.FAILS: "does not", Verdict.OPEN: "is undecided"}
+    many = {Verdict.HOLDS: "hold", Verdict.FAILS: "do not", Verdict.OPEN: "are undecided"}
+    parts = ", ".join(f"{count[kind]} {(one if count[kind] == 1 else many)[kind]}" for kind in one)
     return f"Of {plural(len(findings), 'claim')}, {tested} can be tested here: {parts}."
 
 
 def finding_table(name: str, findings: Sequence[Finding]) -> Table:
     """Show the claims that were tested, each above the comparisons behind it."""
-    bodies = tuple(_body(each) for each in findings if each.verdict is not Verdict.NOT_RUN)
+    bodies = tuple(
+        (Line(each.claim.text, (_verdict_cell(each.verdict), Cell(""), Cell(""))), *map(_line, each.outcomes))
+        for each in findings
+        if each.verdict is not Verdict.NOT_RUN
+    )
     columns = (("Verdict", ""), ("Score", ""), ("Difference", "95% interval"))
     caption = f"The paper's claims, and the same against stronger baselines{_tag(findings)}."
     return Table(name, caption, "Claim", columns, bodies)
@@ -108,43 +116,25 @@ def finding_table(name: str, findings: Sequence[Finding]) -> Table:
 
 def missing_table(name: str, findings: Sequence[Finding]) -> Table:
     """Show the claims that were not tested, and what they need."""
-    bodies = tuple(
-        (Line(each.claim.text, (Cell(", ".join(each.missing)),)),)
-        for each in findings
-        if each.verdict is Verdict.NOT_RUN
-    )
+    untested = (each for each in findings if each.verdict is Verdict.NOT_RUN)
+    lines = [Line(each.claim.text, (Cell(", ".join(each.missing)),)) for each in untested]
     caption = f"Claims that were not run, and the rows or logs that they need{_tag(findings)}."
-    return Table(name, caption, "Claim", (("Needs", ""),), bodies)
+    return plain_table(name, caption, "Claim", ("Needs",), lines)
 
 
 def finding_frame(findings: Sequence[Finding]) -> pd.DataFrame:
     """Return one line for each comparison, with the verdict of its claim beside its own."""
-    lines = [
-        {"run": each.run, "name": each.claim.name, "claim": each.claim.text, "verdict": str(each.verdict), **part}
-        for each in findings
-        for part in map(_values, each.outcomes)
-    ]
-    return pd.DataFrame(lines)
+    return pd.DataFrame([_head(each) | part for each in findings for part in map(_values, each.outcomes)])
 
 
 def finding_records(findings: Sequence[Finding]) -> list[dict[str, Any]]:
     """Return the findings for machines; absent numbers are null."""
-    return [
-        {
-            "run": each.run,
-            "name": each.claim.name,
-            "claim": each.claim.text,
-            "verdict": str(each.verdict),
-            "checks": [
-                {
-                    key: None if isinstance(value, float) and not np.isfinite(value) else value
-                    for key, value in part.items()
-                }
-                for part in map(_values, each.outcomes)
-            ],
-        }
-        for each in findings
-    ]
+    return [_head(each) | {"checks": list(map(_values, each.outcomes))} for each in findings]
+
+
+def _head(finding: Finding) -> dict[str, Any]:
+    claim = finding.claim
+    return {"run": finding.run, "name": claim.name, "claim": claim.text, "verdict": str(finding.verdict)}
 
 
 def _tag(findings: Sequence[Finding]) -> str:
@@ -174,8 +164,7 @@ def _missing(check: Check, scored: Scores, near: Scores) -> tuple[str, ...]:
         return missing
     if any(name not in near for name in check.weights):
         return (TRUTH,)
-    first, *others = (scored[name].row for name in check.weights)
-    return () if all(comparable(first, other) for other in others) else (SAME_TARGETS,)
+    return () if len({scored[name].row.targets for name in check.weights}) == 1 else (SAME_TARGETS,)
 
 
 def _time_difference(check: Check, rows: Scores) -> Estimate:
@@ -185,24 +174,17 @@ def _time_difference(check: Check, rows: Scores) -> Estimate:
     return Estimate(float(np.mean(gaps)), min(gaps) if several else np.nan, max(gaps) if several else np.nan)
 
 
-def _body(finding: Finding) -> tuple[Line, ...]:
-    head = Line(finding.claim.text, (_verdict_cell(finding.verdict), Cell(""), Cell("")))
-    return (head, *(_line(outcome) for outcome in finding.outcomes))
-
-
 def _line(outcome: Outcome) -> Line:
     check, difference = outcome.check, outcome.difference
     if outcome.missing:
-        needs = Cell(f"needs {', '.join(outcome.missing)}")
-        return Line(outcome.check.text, (_verdict_cell(outcome.verdict), needs, Cell(ABSENT)), "part")
-    if check.score == WINDOW_MS:
-        return Line(
-            outcome.check.text, (_verdict_cell(outcome.verdict), Cell("ms a window"), _time_cell(difference)), "part"
-        )
-    label = LABELS[check.score] + (f", {check.region}" if check.region else "")
-    title = f"{interval_phrase(difference, with_sign=True)}; {plural(outcome.windows, 'window')}"
-    number = difference_cell(difference, title=title)
-    return Line(outcome.check.text, (_verdict_cell(outcome.verdict), Cell(label), number), "part")
+        label, number = f"needs {', '.join(outcome.missing)}", Cell(ABSENT)
+    elif check.score == WINDOW_MS:
+        label, number = "ms a window", _time_cell(difference)
+    else:
+        label = LABELS[check.score] + (f", {check.region}" if check.region else "")
+        title = f"{interval_phrase(difference, with_sign=True)}; {plural(outcome.windows, 'window')}"
+        number = difference_cell(difference, title=title)
+    return Line(check.text, (_verdict_cell(outcome.verdict), Cell(label), number), "part")
 
 
 def _time_cell(difference: Estimate) -> Cell:
@@ -217,15 +199,15 @@ def _verdict_cell(found: Verdict) -> Cell:
 def _values(outcome: Outcome) -> dict[str, Any]:
     check, difference = outcome.check, outcome.difference
     return {
-        "comparison": outcome.check.text.replace(MINUS, "-"),
+        "comparison": check.text.replace(MINUS, "-"),
         "score": check.score,
         "region": check.region or "all",
         "rule": check.rule,
         "margin": MARGIN if check.rule in ("close", "at least") else 0.0,
         "comparison_verdict": str(outcome.verdict),
-        "difference": difference.value,
-        "low": difference.low,
-        "high": difference.high,
+        "difference": finite(difference.value),
+        "low": finite(difference.low),
+        "high": finite(difference.high),
         "windows": outcome.windows,
         "missing": ", ".join(outcome.missing),
     }

@@ -1,5 +1,6 @@
-"""The paper's class-wise table (supplement, Table A1) and its training, for comparison with a run."""
+"""The paper's class-wise table (supplement, Table A1), and how a run's trainings differ from its own."""
 
+from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 
@@ -7,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.report.rows.load import Run
 from semgrid_eval.scores.metrics.iou import category_iou
 
 PAPER_SETTINGS = {
@@ -44,3 +46,32 @@ def paper_table() -> dict[str, dict[str, float]]:
     categories = category_iou(table.to_numpy(np.float64))
     whole = table.assign(**categories)
     return {str(name): {str(key): float(value) for key, value in row.items()} for name, row in whole.iterrows()}
+
+
+def scaling(run: Run) -> str:
+    """Say how the training of rows that the paper has, too, differs from the paper's; empty if none was trained."""
+    rows = [row for row in run.rows if row.results and in_paper(row.record.name)]
+    trained = [row for row in rows if row.results[0].record.seed is not None]
+    if not trained:
+        return ""
+    settings = [result.settings for row in trained for result in row.results]
+    found = [
+        _difference(text, {each[key] for each in settings if key in each}, theirs)
+        for key, (text, theirs) in PAPER_SETTINGS.items()
+    ]
+    found.append(_difference("repeats", {len(row.results) for row in trained}, PAPER_REPEATS))
+    found.append(_difference("scored windows", {row.windows for row in rows}, PAPER_WINDOWS))
+    sources = {log.dataset for log in run.record.logs}
+    others = " and ".join(sorted(sources - {PAPER_DATASET}))
+    place = "besides" if PAPER_DATASET in sources else "instead of"
+    found.append(f"data {others} {place} Cityscapes" if others else "")
+    told = ", ".join(filter(None, found))
+    return f"Scaled from the paper's supplement: {told}." if told else "Trained as the paper's supplement says."
+
+
+def _difference(text: str, ours: Iterable[object], theirs: float) -> str:
+    values = sorted(set(ours), key=str)
+    if not values or values == [theirs]:
+        return ""
+    shown = " or ".join("none" if value is None else f"{value:,}" for value in values)
+    return f"{text} {shown} instead of {theirs:,}"

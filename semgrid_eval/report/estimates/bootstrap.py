@@ -12,18 +12,14 @@ import numpy as np
 
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.estimates.resampling import DRAWS, Draws, Resampling
-from semgrid_eval.report.estimates.sums import RegionSums, row_sums
+from semgrid_eval.report.estimates.sums import RowSums, row_sums
 from semgrid_eval.report.rows.load import Result, Row, comparable
-from semgrid_eval.scores.metrics import iou
 from semgrid_eval.scores.metrics.metric import Counts, Floats, Metric, column_names, mean_finite
 from semgrid_eval.scores.metrics.table import IOU, METRICS
 
 LEVEL = 0.95
-CATEGORY_COLUMNS, MERGED_COLUMNS = iou.CATEGORY_COLUMNS, iou.MERGED_COLUMNS
-COLUMNS = column_names(IOU)
-"""Everything that is scored by IoU: the classes, the categories, and the categories with their classes merged."""
 LABELS = {column.name: column.label for column in IOU.columns}
-"""Each of `COLUMNS` in words."""
+"""Every figure of IoU in words: the classes, the categories, and the categories with their classes merged."""
 
 
 @dataclass(frozen=True)
@@ -42,25 +38,15 @@ class Estimate:
 
 @dataclass(frozen=True)
 class RowScores:
-    """Figures of one row in one region.
-
-    Args:
-        row: the row.
-        metric: whose Q columns these are.
-        results: the S results behind them.
-        by_seed: (S, Q) figures of each result.
-        draws: (B, Q) of their mean, resampled.
-        totals: (S, *shape) sums over windows.
-        windows: how many windows have something to count in the region.
-    """
+    """Figures of one row in one region."""
 
     row: Row
-    metric: Metric
-    results: tuple[Result, ...]
-    by_seed: Floats
-    draws: Floats
-    totals: Counts
-    windows: int
+    metric: Metric  # whose Q columns these are
+    results: tuple[Result, ...]  # the S results behind them
+    by_seed: Floats  # (S, Q) figures of each result
+    draws: Floats  # (B, Q) of their mean, resampled
+    totals: Counts  # (S, *shape) sums over windows
+    windows: int  # how many windows have something to count in the region
 
     @cached_property
     def mean(self) -> dict[str, float]:
@@ -128,29 +114,27 @@ def everywhere(everything: Everything, metric: str) -> Scores:
 
 def score_regions(rows: Sequence[Row], metric: Metric, division: Division, resampling: Resampling) -> dict[str, Scores]:
     """Score rows by a metric in each region of a division; regions and rows with nothing to count are left out."""
-    sums = {row.name: row_sums(row, metric, division) for row in rows}
+    sums = [row_sums(row, metric, division) for row in rows]
     found: dict[str, Scores] = {}
     for number, region in enumerate(division.regions):
-        mine = {row.name: sums[row.name].region(number) for row in rows}
-        scores = _score_region([row for row in rows if mine[row.name].windows], mine, metric, resampling)
-        if scores:
-            found[region] = scores
+        counted = [(row, mine[number]) for row, mine in zip(rows, sums, strict=True) if mine[number].windows]
+        if counted:
+            found[region] = _score_region(counted, metric, resampling)
     return found
 
 
-def _score_region(
-    rows: Sequence[Row], sums: Mapping[str, RegionSums], metric: Metric, resampling: Resampling
-) -> dict[str, RowScores]:
-    groups = {name: group for row in rows for name, group in sums[row.name].groups.items()}
-    names = sorted(groups)
-    draws = resampling.draw([groups[name] for name in names], [len(sums[row.name].results) for row in rows])
-    return {row.name: _score_row(row, sums[row.name], metric, names, draws) for row in rows}
+def _score_region(counted: Sequence[tuple[Row, RowSums]], metric: Metric, resampling: Resampling) -> Scores:
+    seen = {name: row for row, sums in counted for part in sums.parts for name in part.recordings.tolist()}
+    names = sorted(seen)
+    draws = resampling.draw([seen[name].group_of[name] for name in names], [len(sums.parts) for _, sums in counted])
+    return {row.name: _score_row(row, sums, metric, names, draws) for row, sums in counted}
 
 
-def _score_row(row: Row, sums: RegionSums, metric: Metric, names: Sequence[str], draws: Draws) -> RowScores:
+def _score_row(row: Row, sums: RowSums, metric: Metric, names: Sequence[str], draws: Draws) -> RowScores:
     by_seed = metric.figures(metric.ratios(sums.totals))
     resampled = draws.over_seeds(metric.figures(draws.resampled(sums.by_recording(names))))
-    return RowScores(row, metric, sums.results, by_seed, resampled, sums.totals, sums.windows)
+    results = tuple(part.result for part in sums.parts)
+    return RowScores(row, metric, results, by_seed, resampled, sums.totals, sums.windows)
 
 
 def _estimate(value: float, draws: Floats) -> Estimate:

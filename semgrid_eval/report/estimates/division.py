@@ -19,17 +19,13 @@ WindowNumbers = Callable[[Row, Result], NDArray[np.int64]]
 class Division:
     """What is scored apart: names of its regions, and how to get what a metric counted in them.
 
-    Args:
-        name: in files and columns.
-        regions: names of the regions.
-        words: what they hold, to follow "IoU".
-        shown: what a report shows of it: columns by metric. Where it is empty, each metric's own choice.
-        sums: counted by a metric for a result, (N, regions, ...); None where the result does not tell.
+    `shown` is what a report shows of it: columns by metric; where it is empty, each metric's own choice. `sums` returns
+    what a metric counted for a result, (N, regions, ...), None where the result does not tell.
     """
 
-    name: str
+    name: str  # in files and columns
     regions: Sequence[str]
-    words: str
+    words: str  # what the regions hold, to follow "IoU"
     shown: Mapping[str, Sequence[str]]
     sums: Callable[[Row, Result, Metric], NDArray[np.int32] | None]
 
@@ -40,11 +36,8 @@ class Division:
 
 def of_cells(partition: Partition) -> Division:
     """Divide by where cells lie, as they were counted."""
-
-    def sums(_: Row, result: Result, metric: Metric) -> NDArray[np.int32] | None:
-        return result.read(metric.name, partition.name)
-
-    return Division(partition.name, partition.regions, partition.words, partition.shown, sums)
+    p = partition
+    return Division(p.name, p.regions, p.words, p.shown, lambda _, result, metric: result.read(metric.name, p.name))
 
 
 def of_windows(

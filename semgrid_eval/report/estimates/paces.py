@@ -44,7 +44,8 @@ def _paces(result: Result, kept: RunThumbnails) -> NDArray[np.int64]:
     """Number the pace of each window: (N,), -1 where nothing is known of the drive."""
     found = np.full(len(result.record.windows), -1, np.int64)
     for i, window in enumerate(result.record.windows):
-        track, newest_ns = kept.track(window.log, result), max(window.input_stamps_ns, default=window.target_stamp_ns)
-        if track is not None and len(track.stamps_ns) and newest_ns < window.target_stamp_ns:
-            found[i] = np.digitize(mean_speed_mps(track, newest_ns, window.target_stamp_ns), EDGES_MPS)
+        track = kept.track(window.log, result)
+        if track is not None and len(track.stamps_ns):
+            speed_mps = mean_speed_mps(track, window.input_stamps_ns[-1], window.target_stamp_ns)
+            found[i] = np.digitize(speed_mps, EDGES_MPS)
     return found

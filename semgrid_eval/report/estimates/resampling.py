@@ -48,13 +48,7 @@ class Draws:
 
 @dataclass(frozen=True)
 class Resampling:
-    """How rows are resampled.
-
-    Args:
-        seed: of the draws; a generator goes on where it is.
-        draws: how many resamples.
-        level: what is resampled first.
-    """
+    """How rows are resampled: from which seed (a generator goes on where it is), how often, and by what first."""
 
     seed: int | np.random.Generator = 0
     draws: int = DRAWS

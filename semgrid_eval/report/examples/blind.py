@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.geometry import SE2
-from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.scores.results import WindowRecord
 from semgrid_eval.scores.thumbnails import Track
 from semgrid_eval.sensors.camera import CameraSensor
@@ -19,26 +19,19 @@ def blind_cells(track: Track, grid: GridConfig, sensors: Sequence[str], window: 
 
     The ground is taken as flat, so this says where ground is seen, not how far walls and cars reach into view.
 
-    Args:
-        track: of the window's log.
-        grid: how its grids were made.
-        sensors: names of the input sensors.
-        window: tells the times of target and inputs.
-
     Returns:
-        None where an input sensor is not a part of the shown camera's image, or where the times of inputs are not
-        known or not those of its frames.
+        None where an input sensor is not a part of the shown camera's image, or inputs have other times than frames.
     """
     parts = parts_of_shown(grid)
     place = {int(stamp): frame for frame, stamp in enumerate(track.stamps_ns)}
     stamps = (window.target_stamp_ns, *window.input_stamps_ns)
-    if len(stamps) < 2 or not all(stamp in place for stamp in stamps) or not all(name in parts for name in sensors):
+    if not all(stamp in place for stamp in stamps) or not all(name in parts for name in sensors):
         return None
     target, *inputs = (place[stamp] for stamp in stamps)
     first = max(0, target - window.target_frame)  # of the stretch whose orientation the grids have
     poses = [SE2(*pose) for pose in track.poses.tolist()]
     grid_pose = SE2(poses[target].x_m, poses[target].y_m, poses[first].yaw_rad)
-    ground_m = grid_pose.apply(_cell_centres_m(grid.spec))
+    ground_m = grid_pose.apply(np.stack(np.meshgrid(*grid.spec.centres_m(), indexing="ij"), axis=-1))  # (H, W, 2)
     seen, covered = np.zeros(ground_m.shape[:2], np.bool_), np.zeros(ground_m.shape[:2], np.bool_)
     for frame in inputs:
         u, v = _image_places(track.projection, poses[frame].inverse().apply(ground_m))
@@ -52,11 +45,6 @@ def parts_of_shown(grid: GridConfig) -> dict[str, CameraSensor]:
     """Return the sensors that are parts of the image of the camera that leads the target, which a run keeps."""
     cameras = {name: sensor for name, sensor in grid.sensors.items() if isinstance(sensor, CameraSensor)}
     return {name: sensor for name, sensor in cameras.items() if grid.camera and sensor.shares_image_with(grid.camera)}
-
-
-def _cell_centres_m(spec: GridSpec) -> NDArray[np.float64]:
-    """Return the centres of a grid's cells forward and left of the vehicle: (H, W, 2)."""
-    return np.stack(np.meshgrid(*spec.centres_m(), indexing="ij"), axis=-1)
 
 
 def _image_places(

@@ -26,23 +26,16 @@ class Crop:
 
 @dataclass(frozen=True)
 class View:
-    """What is known of a window besides its grids.
-
-    Args:
-        window: the window.
-        kept: what the run kept of its log, None where that is nothing.
-        grid: how its grids were made, None where the result does not tell.
-        sensors: names of the input sensors.
-    """
+    """What is known of a window besides its grids."""
 
     window: WindowRecord
-    kept: LogPictures | None
-    grid: GridConfig | None
-    sensors: tuple[str, ...]
+    kept: LogPictures | None  # of its log; None where that is nothing
+    grid: GridConfig | None  # how its grids were made; None where the result does not tell
+    sensors: tuple[str, ...]  # names of those of the inputs
 
-    def photos(self, stamp_ns: int | None, moment: str) -> Iterator[Picture]:
+    def photos(self, stamp_ns: int, moment: str) -> Iterator[Picture]:
         """Return the camera image and the segmentation of a time, as far as they were kept."""
-        if self.kept is None or self.grid is None or stamp_ns is None or stamp_ns not in self.kept.frames:
+        if self.kept is None or self.grid is None or stamp_ns not in self.kept.frames:
             return
         files = self.kept.frames[stamp_ns]
         if files.image:
@@ -51,16 +44,9 @@ class View:
             title = "Segmentation"
             yield label_picture(title, f"{title}, {moment}", files.label, self.grid.class_by_label())
 
-    def before(self, stamp_ns: int | None) -> str:
+    def before(self, stamp_ns: int) -> str:
         """Tell how long before the target a time is."""
-        if stamp_ns is None:
-            return ""
         return f"{(self.window.target_stamp_ns - stamp_ns) / 1e9:.3f} s before the target"
-
-    def input_stamp_ns(self, back: int) -> int | None:
-        """Return the time of an input, `back` counted from the newest, None where the result does not tell."""
-        stamps = self.window.input_stamps_ns
-        return stamps[-1 - back] if back < len(stamps) else None
 
     @property
     def crops(self) -> tuple[Crop, ...]:
@@ -68,7 +54,7 @@ class View:
         if self.grid is None:
             return ()
         parts = parts_of_shown(self.grid)
-        seen = [name for name in self.sensors if name in parts and not parts[name].is_whole_image]
+        seen = (name for name in self.sensors if name in parts and not parts[name].is_whole_image)
         return tuple(_crop(name, parts[name]) for name in seen)
 
     @property
@@ -83,6 +69,5 @@ class View:
 def _crop(name: str, part: CameraSensor) -> Crop:
     width, height = part.image_size_px
     top, bottom, left, right = part.crop_px
-    return Crop(
-        name, 100 * left / width, 100 * top / height, 100 * (right - left) / width, 100 * (bottom - top) / height
-    )
+    across, down = 100 / width, 100 / height
+    return Crop(name, left * across, top * down, (right - left) * across, (bottom - top) * down)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, KNOWN_IDS
+from semgrid_eval.classes import CLASS_NAMES, KNOWN_IDS
 from semgrid_eval.report.rows.load import Result, Row, comparable, key_of
 from semgrid_eval.report.rows.pairing import Headline, reference_of
 from semgrid_eval.report.rows.settings import settings_but
@@ -28,17 +28,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Contest:
-    """A model and the rows that it is measured against.
-
-    Args:
-        model: the row.
-        rivals: baselines, or the same model asked to look further ahead.
-        baselines: in the second case, the baseline of the model's horizon and of each rival's, None where none is.
-    """
+    """A model and the rows that it is measured against: baselines, or the same model asked to look further ahead."""
 
     model: Row
     rivals: tuple[Row, ...]
-    baselines: tuple[Row | None, ...] = ()
+    baselines: tuple[Row | None, ...] = ()  # in the second case, of the model's horizon and of each rival's
 
     @property
     def result(self) -> Result:
@@ -72,7 +66,9 @@ def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
     """
     if headline is None:
         return []
-    found = [Contest(main := _main(headline), tuple(_rivals(main, rows, headline)))]
+    models = (row for row in (headline.best, headline.rival) if row is not None and not row.is_baseline)
+    main = next(models, headline.best)
+    found = [Contest(main, tuple(_rivals(main, rows, headline)))]
     if later := _looking_further(main, rows):
         found.append(Contest(main, tuple(later), tuple(reference_of(row, rows) for row in (main, *later))))
     others = [(row, reference_of(row, rows)) for row in rows if not row.is_baseline and row != main]
@@ -111,8 +107,7 @@ def by_window(picks: Sequence[Pick]) -> list[tuple[Pick, ...]]:
 
 def mean_iou(result: Result, window: WindowRecord) -> float:
     """Mean IoU of a result in one window over the known classes with enough cells; NaN where it has no such window."""
-    at = result.places.get(key_of(window))
-    if at is None:
+    if (at := result.places.get(key_of(window))) is None:
         return float("nan")
     counts = result.counts[[at]].astype(np.int64)
     values = np.where(counts.sum(axis=2) < MIN_CELLS, np.nan, class_iou(counts))
@@ -125,24 +120,14 @@ def rule_values(contest: Contest) -> Array:
     mine = class_iou(counts.astype(np.int64))
     few = counts.sum(axis=2) < MIN_CELLS
     gaps = [mine - _aligned_iou(contest.result, rival.shown) for rival in contest.rivals] or [mine]
-    value = gaps[0]
-    for gap in gaps[1:]:
-        value = np.minimum(value, gap)
-    return np.where(few, np.nan, value)
+    return np.where(few, np.nan, np.minimum.reduce(gaps))
 
 
 def _aligned_iou(result: Result, other: Result) -> Array:
     """IoU of another result's windows in the order of `result`; NaN where it has no such window."""
     theirs = class_iou(other.counts.astype(np.int64))
     places = np.array([other.places.get(key_of(window), -1) for window in result.record.windows], np.intp)
-    padded = np.vstack([theirs, np.full((1, CLASS_COUNT), np.nan)])
-    return np.asarray(padded[places])
-
-
-def _main(headline: Headline) -> Row:
-    """Return the best row of the main group that is not a baseline, the best one where all are."""
-    models = (row for row in (headline.best, headline.rival) if row is not None and not row.is_baseline)
-    return next(models, headline.best)
+    return np.where(places[:, None] >= 0, theirs[places], np.nan)
 
 
 def _rivals(main: Row, rows: Sequence[Row], headline: Headline) -> list[Row]:
@@ -150,28 +135,18 @@ def _rivals(main: Row, rows: Sequence[Row], headline: Headline) -> list[Row]:
     if reference is None:
         pair = (headline.best, headline.rival)
         return [row for row in pair if row is not None and row != main][:1]
-    return [reference, *(row for row in rows if _is_untranslated_twin(row, reference))][:_MOST_RIVALS]
-
-
-def _is_untranslated_twin(row: Row, reference: Row) -> bool:
-    """Tell whether a row is the reference but for its inputs, which are not moved to the target's time."""
-    untranslated = reference.record.facts.model_copy(update={"translate": False})
-    same = row.run == reference.run and comparable(row, reference)
-    return same and row != reference and row.record.facts == untranslated
+    unmoved = reference.record.facts.model_copy(update={"translate": False})
+    others = (row for row in rows if row.run == main.run and comparable(row, main) and row != reference)
+    return [reference, *(row for row in others if row.record.facts == unmoved)][:_MOST_RIVALS]
 
 
 def _looking_further(main: Row, rows: Sequence[Row]) -> list[Row]:
     """List the rows that are the main one but for a longer horizon, at the same targets: the nearest first."""
-    mine = settings_but(main, "horizon_steps")
-    found = [
-        row
-        for row in rows
-        if row.run == main.run
-        and comparable(row, main)
-        and row.record.facts.horizon_steps > main.record.facts.horizon_steps
-        and settings_but(row, "horizon_steps") == mine
-    ]
-    return sorted(found, key=lambda row: row.record.facts.horizon_steps)
+    mine, steps = settings_but(main, "horizon_steps"), main.record.facts.horizon_steps
+    others = [row for row in rows if row.run == main.run and comparable(row, main)]
+    found = [row for row in others if row.record.facts.horizon_steps > steps]
+    alike = [row for row in found if settings_but(row, "horizon_steps") == mine]
+    return sorted(alike, key=lambda row: row.record.facts.horizon_steps)
 
 
 def _ordered(values: Array) -> NDArray[np.intp]:

@@ -1,4 +1,4 @@
-"""Small pictures of grids and labels, as data URIs that a page carries in itself."""
+"""Small pictures of grids and labels, as data URIs that a page carries in itself, and the colours of classes."""
 
 import base64
 import io
@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, NO_POINT, UNKNOWN, class_palette
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, MASK_COLOUR, NO_POINT, UNKNOWN, class_palette
 from semgrid_eval.recording.png import decode_ids
-from semgrid_eval.report.page.colours import class_colours, hex_colour
 
 Grid = NDArray[np.uint8]
 
@@ -23,48 +22,40 @@ RIGHT_LABELS = ("unknown in all", "both right", "only the model right", "only th
 _CERTAINTY_LEVELS = 16
 _HATCH_SCALE, _HATCH_STEP = 3, 11  # pixels of an edge of a cell, and from line to line
 
-CLASS_LEGEND = class_colours()
-MASK_LEGEND = ("M (left out)", hex_colour(MASK_COLOUR))
-POINTLESS_LEGEND = ("in no grid (sky, own vehicle)", hex_colour(POINTLESS_COLOUR))
-HATCH_LEGEND = ("hatched: ground that no sensor of an input sees", hex_colour(HATCH_COLOUR))
+
+def _hex(colour: tuple[int, int, int]) -> str:
+    """Write a colour as CSS does."""
+    return "#{:02x}{:02x}{:02x}".format(*colour)
+
+
+CLASS_LEGEND = tuple((name.replace("_", " "), f"var(--class-{i})") for i, name in enumerate(CLASS_NAMES))
+"""Each class with its colour in whichever palette holds."""
+MASK_LEGEND = ("M (left out)", _hex(MASK_COLOUR))
+POINTLESS_LEGEND = ("in no grid (sky, own vehicle)", _hex(POINTLESS_COLOUR))
+HATCH_LEGEND = ("hatched: ground that no sensor of an input sees", _hex(HATCH_COLOUR))
 LEGEND = (*CLASS_LEGEND, MASK_LEGEND, POINTLESS_LEGEND, HATCH_LEGEND)
 """Name and colour by class id, then by `MASKED`, `POINTLESS` and `HATCHED`."""
-RIGHT_LEGEND = tuple((name, hex_colour(colour)) for name, colour in zip(RIGHT_LABELS, RIGHT_COLOURS, strict=True))
+RIGHT_LEGEND = tuple((name, _hex(colour)) for name, colour in zip(RIGHT_LABELS, RIGHT_COLOURS, strict=True))
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture of an example.
-
-    Args:
-        title: tells it from others of the same moment.
-        alt: what it shows, as its alternative text.
-        uri: its data URI.
-        kind: `camera`, `labels` or `grid`.
-        lead: whether it is the one to show large.
-        colours: which of `LEGEND` appear in it.
-    """
+    """One picture of an example; its title tells it from others of the same moment."""
 
     title: str
-    alt: str
+    alt: str  # what it shows
     uri: str
     kind: Literal["camera", "labels", "grid"] = "grid"
-    lead: bool = True
-    colours: frozenset[int] = frozenset()
+    lead: bool = True  # whether it is the one to show large
+    colours: frozenset[int] = frozenset()  # which of `LEGEND` appear in it
 
 
 def grid_picture(
     title: str, alt: str, grid: Grid, mask: NDArray[np.bool_] | None = None, *, lead: bool = True
 ) -> Picture:
-    """Make the picture of a grid (H, W), mask M in white."""
-    there = np.unique(grid if mask is None else np.where(mask, MASKED, grid)).tolist()
-    return Picture(title, alt, data_uri(grid_png(grid, mask)), lead=lead, colours=frozenset(there))
-
-
-def grid_png(grid: Grid, mask: NDArray[np.bool_] | None = None) -> bytes:
-    """Draw a grid in the colour-blind-safe class colours, which a page's reader may switch, M in white: (H, W)."""
+    """Draw a grid (H, W) in the colour-blind-safe class colours, which a page's reader may switch, mask M in white."""
     shown = grid if mask is None else np.where(mask, MASKED, grid).astype(np.uint8)
-    return _png(shown, _class_palette())
+    return Picture(title, alt, data_uri(_png(shown, _class_palette())), lead=lead, colours=_colours(shown))
 
 
 def label_picture(title: str, alt: str, label: bytes, class_by_label: Grid) -> Picture:
@@ -75,8 +66,7 @@ def label_picture(title: str, alt: str, label: bytes, class_by_label: Grid) -> P
     """
     classes = class_by_label[decode_ids(label)]
     shown = np.where(classes == NO_POINT, POINTLESS, classes).astype(np.uint8)
-    there = np.unique(shown).tolist()
-    return Picture(title, alt, data_uri(_png(shown, _class_palette())), "labels", colours=frozenset(there))
+    return Picture(title, alt, data_uri(_png(shown, _class_palette())), "labels", colours=_colours(shown))
 
 
 def hatch_png(cells: NDArray[np.bool_]) -> bytes:
@@ -110,15 +100,30 @@ def data_uri(content: bytes, kind: str = "image/png") -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
+def _colours(shown: Grid) -> frozenset[int]:
+    return frozenset(np.unique(shown).tolist())
+
+
 def _class_palette() -> Grid:
     return np.vstack([class_palette(safe=True), np.array([MASK_COLOUR, POINTLESS_COLOUR], np.uint8)])
 
 
 def _png(indices: Grid, palette: NDArray[np.uint8], *, bits: int = 4, clear: int | None = None) -> bytes:
-    height, width = indices.shape
-    picture = Image.frombytes("P", (width, height), indices.tobytes())
+    picture = Image.frombytes("P", indices.shape[::-1], indices.tobytes())  # width, height
     picture.putpalette(palette.tobytes())
     stream = io.BytesIO()
     transparent = {} if clear is None else {"transparency": clear}
     picture.save(stream, "PNG", bits=bits, optimize=True, **transparent)
     return stream.getvalue()
+
+
+def class_style() -> str:
+    """Write both palettes as CSS: properties `--class-0`, ..., the paper's under `:root[data-colours=paper]`.
+
+    The page's script gives pictures the palette whose properties hold.
+    """
+    palettes = {":root": class_palette(safe=True), ":root[data-colours=paper]": class_palette()}
+    return "".join(
+        f"{selector}{{{';'.join(f'--class-{i}:{_hex(colour)}' for i, colour in enumerate(palette.tolist()))}}}"
+        for selector, palette in palettes.items()
+    )

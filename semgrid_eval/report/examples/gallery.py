@@ -17,24 +17,16 @@ _BEST, _WORST, _OTHER = 3, 3, 1
 
 @dataclass(frozen=True)
 class Group:
-    """The example windows of one contest, or in words why there are none.
-
-    Args:
-        hint: what is special about it.
-        rule: by which its windows were chosen.
-        seed: of the predictions shown.
-        looks_ahead: whether its rows look ahead differently far.
-        shown: whether the group is open when the page is opened.
-    """
+    """The example windows of one contest, or in words why there are none."""
 
     title: str
-    hint: str
-    rule: str
-    seed: int | None
+    hint: str  # what is special about it
+    rule: str  # by which its windows were chosen
+    seed: int | None  # of the predictions shown
     windows: tuple[Example, ...]
     problem: str
-    looks_ahead: bool = False
-    shown: bool = False
+    looks_ahead: bool = False  # whether its rows look ahead differently far
+    shown: bool = False  # whether the group is open when the page is opened
 
 
 def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | None) -> list[Group]:
@@ -49,11 +41,9 @@ def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | N
         *({"": choose(each, best=_OTHER, worst=_OTHER)} for each in others),
     ]
     read = lru_cache(1)(read_windows)  # contests that share windows are drawn one after the other
-    drawn = {
-        i: groups_of(chosen[i], plans[i], kept[chosen[i].model.run], read)
-        for i in sorted(range(len(chosen)), key=lambda i: chosen[i].model.window_set)
-    }
-    first, *rest = (group for i in range(len(chosen)) for group in drawn[i])
+    order = sorted(range(len(chosen)), key=lambda i: chosen[i].model.window_set)
+    drawn = {i: groups_of(chosen[i], plans[i], kept[chosen[i].model.run], read) for i in order}
+    first, *rest = (group for i in sorted(drawn) for group in drawn[i])
     return [replace(first, shown=True), *rest]
 
 
@@ -68,18 +58,12 @@ def groups_of(
         windows = {end: tuple(draw_examples(shown, picks, thumbnails)) for end, picks in plan.items()}
     except (SemgridError, ValueError, IndexError) as error:
         problem = f"The pictures of {contest.model.name} cannot be shown: {error}"
-    return [
-        Group(
-            title=_title(contest) + end,
-            hint=_hint(contest, windows[end]),
-            rule=contest.rule,
-            seed=contest.result.record.seed,
-            windows=windows[end],
-            problem=problem if picks else "No window has enough cells of any class.",
-            looks_ahead=bool(contest.baselines),
-        )
-        for end, picks in plan.items()
-    ]
+    found = []
+    for end, picks in plan.items():
+        title, hint, seed = _title(contest) + end, _hint(contest, windows[end]), contest.result.record.seed
+        why = problem if picks else "No window has enough cells of any class."
+        found.append(Group(title, hint, contest.rule, seed, windows[end], why, looks_ahead=bool(contest.baselines)))
+    return found
 
 
 def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
@@ -91,9 +75,8 @@ def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
         said.append("No row has several sensors, so there is no example with a blind band.")
     if not any(group.looks_ahead for group in groups):
         said.append("The model shown first was not run with several horizons, so there is no example of them in a row.")
-    shown = [window for group in groups for window in group.windows]
-    pictures = [picture for window in shown for column in window.film for picture in column.pictures]
-    if shown and not any(picture.kind == "camera" for picture in pictures):
+    columns = [column for group in groups for window in group.windows for column in window.film]
+    if columns and not any(picture.kind == "camera" for column in columns for picture in column.pictures):
         said.append(
             "There are no camera images: the run kept none of its logs, or they hold none. "
             "Started again where its logs are, semgrid-eval run adds what is missing."
@@ -103,8 +86,8 @@ def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
 
 def widths(rows: Sequence[Row]) -> str:
     """Say how wide the grids of rows are."""
-    specs = [row.shown.spec for row in rows]
-    return " or ".join(f"{width_m:g} m" for width_m in sorted({spec.columns * spec.cell_m for spec in specs}))
+    widths_m = {spec.columns * spec.cell_m for spec in (row.shown.spec for row in rows)}
+    return " or ".join(f"{width_m:g} m" for width_m in sorted(widths_m))
 
 
 def _title(contest: Contest) -> str:

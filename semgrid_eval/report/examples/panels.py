@@ -21,23 +21,19 @@ from semgrid_eval.report.examples.drawing import (
 from semgrid_eval.report.examples.thumbnails import RunThumbnails, times
 from semgrid_eval.report.rows.load import Row, WindowReader, key_of
 from semgrid_eval.report.tables.table import ABSENT, number, plural, signed
-from semgrid_eval.scores.results import read_predictions, read_windows
+from semgrid_eval.scores.results import WindowRecord, read_predictions, read_windows
 
 _FEWEST_COLUMNS, _MOST_COLUMNS = 4, 6
 
 
 @dataclass(frozen=True)
 class Column:
-    """Pictures of one moment, one above the other, with a title and a small second line.
-
-    Args:
-        step: whether it belongs to the way from the inputs over the target to the prediction.
-    """
+    """Pictures of one moment, one above the other, with a title and a small second line."""
 
     title: str
     note: str
     pictures: tuple[Picture, ...]
-    step: bool = True
+    step: bool = True  # whether it belongs to the way from the inputs over the target to the prediction
 
     @property
     def grids(self) -> int:
@@ -47,29 +43,17 @@ class Column:
 
 @dataclass(frozen=True)
 class Example:
-    """One example window, ready to be shown.
+    """One example window, ready to be shown."""
 
-    Args:
-        title: why it was chosen.
-        times: of the target, in several forms.
-        command: plays the recording.
-        film: inputs and target in the order of time.
-        answers: predictions and what follows from them.
-        crops: parts of the camera's image that act as sensors.
-        hatching: a picture to lay over grids.
-    """
-
-    title: str
-    recording: str
-    log: str
-    frame: int
-    times: tuple[str, ...]
-    command: str
-    film: tuple[Column, ...]
-    answers: tuple[Column, ...]
+    title: str  # why it was chosen
+    window: WindowRecord
+    times: tuple[str, ...]  # of the target, in several forms
+    command: str  # plays the recording
+    film: tuple[Column, ...]  # inputs and target in the order of time
+    answers: tuple[Column, ...]  # predictions and what follows from them
     legend: tuple[tuple[str, str], ...]
-    crops: tuple[Crop, ...] = ()
-    hatching: str = ""
+    crops: tuple[Crop, ...] = ()  # parts of the camera's image that act as sensors
+    hatching: str = ""  # a picture to lay over grids
 
     @property
     def columns(self) -> int:
@@ -112,9 +96,8 @@ class Shown:
         for row in there:
             yield self._answer(row, i, step=False)
         for row in there[:1]:
-            alt = f"Cells where {model.name} or {row.name} is right"
-            theirs = self._answers[row.name][i]["prediction"]
-            right = right_png(seen["target"], mine["prediction"], theirs, seen["mask"] > 0)
+            alt, theirs = f"Cells where {model.name} or {row.name} is right", self._answers[row.name][i]
+            right = right_png(seen["target"], mine["prediction"], theirs["prediction"], seen["mask"] > 0)
             yield Column("Who is right", "cell by cell", (Picture("", alt, data_uri(right)),), step=False)
         certainty = mine["certainty"]
         if certainty.min() < certainty.max():  # a baseline is equally certain of everything
@@ -126,8 +109,8 @@ class Shown:
         model = self.contest.model
         inputs, names = self._seen[model.name][i]["inputs"], model.record.facts.sensors
         sensors, steps = inputs.shape[:2]
-        for t in range(steps):
-            title, stamp_ns = f"Input {t + 1} of {steps}", view.input_stamp_ns(steps - 1 - t)
+        for t, stamp_ns in enumerate(view.window.input_stamps_ns):
+            title = f"Input {t + 1} of {steps}"
             grids = (_input_picture(inputs[s, t], title, names[s] if sensors > 1 else "") for s in range(sensors))
             yield Column(title, view.before(stamp_ns), (*view.photos(stamp_ns, title), *grids))
 
@@ -146,8 +129,7 @@ class Shown:
                 title = f"{baseline.name}{self._iou(baseline, i)}"
                 grids.append(self._prediction(baseline, i, title, lead=False))
             title = f"{plural(row.record.facts.horizon_steps, 'step')} ahead"
-            stamps = row.shown.record.windows[row.shown.places[key_of(self._windows[i])]].input_stamps_ns
-            stamp_ns = stamps[-1] if stamps else None
+            stamp_ns = row.shown.record.windows[row.shown.places[key_of(self._windows[i])]].input_stamps_ns[-1]
             yield Column(title, view.before(stamp_ns), (*view.photos(stamp_ns, title), *grids))
 
     def _answer(self, row: Row, i: int, *, step: bool) -> Column:
@@ -162,12 +144,11 @@ class Shown:
 
     def _of(self, row: Row, arrays: Mapping[str, NDArray[np.generic]]) -> dict[int, dict[str, Grid]]:
         """Copy what arrays hold of the windows that a row has, so that the rest need not be kept."""
-        places = {i: row.shown.places.get(key_of(window)) for i, window in self._windows.items()}
-        return {
-            i: {name: np.array(array[place], np.uint8) for name, array in arrays.items()}
-            for i, place in places.items()
-            if place is not None
-        }
+        places, found = row.shown.places, {}
+        for i, window in self._windows.items():
+            if (place := places.get(key_of(window))) is not None:
+                found[i] = {name: np.array(array[place], np.uint8) for name, array in arrays.items()}
+        return found
 
 
 def draw_examples(shown: Shown, picks: Sequence[Pick], thumbnails: RunThumbnails) -> Iterator[Example]:
@@ -178,20 +159,17 @@ def draw_examples(shown: Shown, picks: Sequence[Pick], thumbnails: RunThumbnails
         window = result.record.windows[index]
         kept = thumbnails.of(window.log, result)
         view = View(window, kept, result.grid, contest.model.record.facts.sensors)
-        film = tuple(shown.film(index, view))
-        answers = tuple(shown.answers(index))
-        hatching = view.hatching
+        film, answers, hatching = tuple(shown.film(index, view)), tuple(shown.answers(index)), view.hatching
+        colours = set[int]().union(*(each.colours for column in (*film, *answers) for each in column.pictures))
         yield Example(
-            title="; ".join(f"{pick.reason}: {_score(contest, pick)}" for pick in group),
-            recording=window.recording,
-            log=window.log,
-            frame=window.target_frame,
+            title="; ".join(f"{pick.reason}: {(signed if contest.rivals else number)(pick.score)}" for pick in group),
+            window=window,
             times=times(window.target_stamp_ns, kept),
             command=thumbnails.command(contest.model, window),
             film=film,
             answers=answers,
-            legend=_legend([*film, *answers], {HATCHED} if hatching else set()),
-            crops=view.crops if kept is not None else (),
+            legend=tuple(LEGEND[i] for i in sorted(colours | ({HATCHED} if hatching else set()))),
+            crops=() if kept is None else view.crops,
             hatching=hatching,
         )
 
@@ -199,13 +177,3 @@ def draw_examples(shown: Shown, picks: Sequence[Pick], thumbnails: RunThumbnails
 def _input_picture(grid: Grid, title: str, sensor: str, *, lead: bool = True) -> Picture:
     name = f"{title}, {sensor}" if sensor else title
     return grid_picture(sensor or "Newest input", f"{name}, aligned to the target", grid, lead=lead)
-
-
-def _score(contest: Contest, pick: Pick) -> str:
-    return signed(pick.score) if contest.rivals else number(pick.score)
-
-
-def _legend(columns: Iterable[Column], more: set[int]) -> tuple[tuple[str, str], ...]:
-    """Name the colours that appear in an example."""
-    there = more.union(*(picture.colours for column in columns for picture in column.pictures))
-    return tuple(LEGEND[i] for i in sorted(there))

@@ -61,10 +61,5 @@ def times(stamp_ns: int, kept: LogPictures | None) -> tuple[str, ...]:
     """Write a time in the forms that viewers take: nanoseconds, seconds, since the log's start, and as a date."""
     seconds = f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
     since = () if kept is None else (f"{(stamp_ns - kept.track.start_ns) / 1e9:.3f} s into the log",)
-    date = () if stamp_ns < _EPOCH_FROM_NS else (shown_date(stamp_ns),)
-    return (f"{stamp_ns} ns", f"{seconds} s", *since, *date)
-
-
-def shown_date(stamp_ns: int) -> str:
-    """Write a time stamp as a date."""
-    return f"{datetime.fromtimestamp(stamp_ns // 10**9, UTC):%Y-%m-%d %H:%M:%S}.{stamp_ns % 10**9 // 10**6:03d} UTC"
+    date = f"{datetime.fromtimestamp(stamp_ns // 10**9, UTC):%Y-%m-%d %H:%M:%S}.{stamp_ns % 10**9 // 10**6:03d} UTC"
+    return (f"{stamp_ns} ns", f"{seconds} s", *since, *((date,) if stamp_ns >= _EPOCH_FROM_NS else ()))

@@ -1,6 +1,6 @@
 """Category scores of every row as bars, grouped by question, with intervals and the paper's own values (its Fig. 5)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import matplotlib as mpl
@@ -51,10 +51,12 @@ def category_plots(scores: Scores) -> list[Plot]:
     with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=size_in, layout="constrained")
         panels = figure.subplots(1, len(CATEGORY_NAMES), sharey=True)
+        colours = family_colours(entry.row for entry in scores.values())
         for axes, category in zip(panels, CATEGORY_NAMES, strict=True):
-            _panel(axes, scores, category, groups)
+            _panel(axes, scores, category, groups, colours)
         _name_rows(panels[0], groups)
-        _legend(figure, scores)
+        handles, labels = [Patch(color=colour) for colour in colours.values()], list(map(short, colours))
+        figure.legend(handles, labels, fontsize=8, ncols=len(labels), loc="outside upper right", handlelength=1)
         caption = f"Category IoU by row ({evidence(scores)}). Rows that answer the same question stand together;"
         return [finish(figure, "categories", "summary.csv", f"{caption} lines are 95% intervals{paper_note(scores)}")]
 
@@ -70,22 +72,22 @@ def lay_out(scores: Scores) -> list[Group]:
     return groups
 
 
-def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group]) -> None:
-    colours = family_colours(entry.row for entry in scores.values())
+def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group], colours: Mapping[str, str]) -> None:
+    longest = 0.0
     for name, place in (item for group in groups for item in group.places.items()):
         entry = scores[name]
-        _bar(axes, entry, category, place, colours[entry.row.record.facts.family])
+        longest = max(longest, _bar(axes, entry, category, place, colours[entry.row.record.facts.family]))
     axes.set_title(LABELS[category], loc="left", fontweight="bold")
     axes.set_xlabel("IoU")
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
-    axes.set_xlim(0, _ROOM * max(_highest(scores, category), 1e-3))
+    axes.set_xlim(0, _ROOM * max(longest, 1e-3))
     axes.set_xticks([tick for tick in axes.get_xticks() if tick <= 1])
 
 
-def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str) -> None:
-    """Draw a bar with its interval, the paper's value, and its number at the right edge of the panel."""
+def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str) -> float:
+    """Draw a bar with its interval, the paper's value, and its number at the right edge; return how far it reaches."""
     estimate, paper = entry.estimate(category), paper_value(entry.row.record.name, category)
     axes.barh(place, np.nan_to_num(estimate.value), 0.78, color=colour)
     if np.isfinite(estimate.low):
@@ -94,6 +96,7 @@ def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str)
         axes.plot(paper, place, "D", markersize=3.4, **PAPER_MARKS)
     label = f"{estimate.value:.2f}" if np.isfinite(estimate.value) else "absent"
     axes.text(1, place, label, transform=axes.get_yaxis_transform(), ha="right", va="center", fontsize=7)
+    return float(np.nanmax([0.0, estimate.value, estimate.high, paper]))
 
 
 def _name_rows(axes: Axes, groups: Sequence[Group]) -> None:
@@ -106,21 +109,6 @@ def _name_rows(axes: Axes, groups: Sequence[Group]) -> None:
         axes.annotate(group.words, (0, above), (2, 0), textcoords="offset points", va="center", color=MUTED, fontsize=7)
 
 
-def _legend(figure: Figure, scores: Scores) -> None:
-    """Name the families' colours above the panels."""
-    colours = family_colours(entry.row for entry in scores.values())
-    handles = [Patch(color=colour) for colour in colours.values()]
-    labels = [short(family) for family in colours]
-    figure.legend(handles, labels, fontsize=8, ncols=len(labels), loc="outside upper right", handlelength=1)
-
-
-def _highest(scores: Scores, category: str) -> float:
-    """Return the highest value of a panel, which its width follows."""
-    estimates = [entry.estimate(category) for entry in scores.values()]
-    papers = [paper_value(entry.row.record.name, category) for entry in scores.values()]
-    return float(np.nanmax([0.0, *papers, *(v for e in estimates for v in (e.value, e.high))]))
-
-
 def _words(row: Row, first: Row) -> str:
     """Say what a question asks, as far as it is not what the first one asks."""
     return ", ".join(_differences(row, first)) or ", ".join(_differences(row, None))
@@ -128,13 +116,12 @@ def _words(row: Row, first: Row) -> str:
 
 def _differences(row: Row, first: Row | None) -> Iterator[str]:
     mine, theirs = row.record.facts, None if first is None else first.record.facts
-    lead_s = row.results[0].record.lead_s
     if theirs is None or mine.inputs != theirs.inputs:
         yield f"{mine.inputs} input{'' if mine.inputs == 1 else 's'}"
     if theirs is None or mine.sensors != theirs.sensors:
         yield short(" + ".join(mine.sensors), 40)
     if theirs is None or (mine.horizon_steps, mine.step_frames) != (theirs.horizon_steps, theirs.step_frames):
-        yield f"{lead_s:.2f} s ahead"
+        yield f"{row.results[0].record.lead_s:.2f} s ahead"
     if not mine.translate and (theirs is None or theirs.translate):
         yield "inputs not moved to the target's time"
     if mine.translate and theirs is not None and not theirs.translate:

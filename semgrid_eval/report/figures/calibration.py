@@ -18,7 +18,7 @@ _CAPTION = (
 
 def reliability_frame(entry: RowScores) -> pd.DataFrame:
     """Return certainty, right and cells of each bin that has cells, all repeats together."""
-    table = pd.DataFrame(vars(CALIBRATION.reliability(CALIBRATION.ratios(entry.totals.sum(axis=0)))))
+    table = pd.DataFrame(CALIBRATION.reliability(CALIBRATION.ratios(entry.totals.sum(axis=0)))._asdict())
     return table[table.cells > 0].reset_index(drop=True)
 
 

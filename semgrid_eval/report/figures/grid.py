@@ -20,13 +20,9 @@ def draw_grid(
     spec: GridSpec | None = None,
     axes: "Axes | None" = None,
 ) -> "Axes":
-    """Draw a grid (H, W) of class ids in the colour-blind-safe colours, mask M in white.
+    """Draw a grid (H, W) of class ids in the colour-blind-safe colours, mask M (H, W) in white.
 
-    Args:
-        grid: class ids.
-        mask: (H, W), drawn in white.
-        spec: extent of the grid; the default one if not given.
-        axes: where to draw; axes of a new figure if not given.
+    Without a spec the extent is the default one; without axes there is a new figure.
     """
     spec = spec or GridSpec(rows=grid.shape[0], columns=grid.shape[1])
     axes = Figure(layout="constrained").add_subplot() if axes is None else axes

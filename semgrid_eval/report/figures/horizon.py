@@ -7,28 +7,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from semgrid_eval.classes import CATEGORY_NAMES
-from semgrid_eval.report.claims.paper import in_paper, paper_value
+from semgrid_eval.report.claims.paper import paper_value
 from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
-from semgrid_eval.report.figures.style import (
-    PALETTE,
-    PAPER_MARKS,
-    SETTINGS,
-    Plot,
-    evidence,
-    finish,
-    paper_note,
-    short,
-)
+from semgrid_eval.report.figures.style import PALETTE, PAPER_MARKS, SETTINGS, Plot, evidence, finish, paper_note, short
 from semgrid_eval.report.rows.settings import settings_but
-
-_HORIZON = "horizon_steps"
 
 
 def horizon_lines(scores: Scores) -> list[list[RowScores]]:
     """Return the rows of one run with the same targets that differ in the horizon alone, by lead; at least two."""
     lines: dict[object, dict[float, RowScores]] = {}
     for entry in scores.values():
-        key = (entry.row.run, entry.row.targets, settings_but(entry.row, _HORIZON))
+        key = (entry.row.run, entry.row.targets, settings_but(entry.row, "horizon_steps"))
         lines.setdefault(key, {}).setdefault(_lead_s(entry), entry)  # rows that mean the same are one point
     found = [[line[lead] for lead in sorted(line)] for line in lines.values() if len(line) > 1]
     return sorted(found, key=lambda line: not line[0].row.is_baseline)
@@ -62,10 +51,8 @@ def _line(axes: Axes, line: Sequence[RowScores], category: str, colour: str) -> 
     axes.plot(leads, [e.value for e in estimates], "o-", color=colour, label=name, markersize=4)
     low, high = [e.low for e in estimates], [e.high for e in estimates]
     axes.fill_between(leads, low, high, color=colour, alpha=0.18, linewidth=0)
-    for lead, entry in zip(leads, line, strict=True):
-        if in_paper(entry.row.record.name):
-            paper = paper_value(entry.row.record.name, category)
-            axes.plot(lead, paper, "D", markersize=4, **(PAPER_MARKS | {"markeredgecolor": colour}))
+    papers = [paper_value(entry.row.record.name, category) for entry in line]
+    axes.plot(leads, papers, "D", markersize=4, **(PAPER_MARKS | {"markeredgecolor": colour}))
 
 
 def _lead_s(entry: RowScores) -> float:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
 from semgrid_eval.report.figures.style import INK, PALETTE, SETTINGS, Plot, evidence, finish, short
 from semgrid_eval.report.rows.pairing import HEADLINE
-from semgrid_eval.report.rows.varied import Varied, varied_settings
+from semgrid_eval.report.rows.settings import Varied, varied_settings
 
 COLUMNS = ("figure", "row", "setting", "value", "by", "by_value", "parameters", "iou", "low", "high", "window_ms")
 _ASIDE = 0.02  # of the axis: how far lines stand apart, so that their intervals can be told apart
@@ -21,10 +21,10 @@ def settings_frame(scores: Scores) -> pd.DataFrame:
     """Return one line for each row of each figure: `COLUMNS`."""
     lines = []
     for index, varied in enumerate(varied_settings(scores)):
+        setting, by = (*varied.keys, "")[:2]
         for entry in varied.rows:
-            iou, record = entry.estimate(HEADLINE), entry.row.results[0].record
-            by = varied.keys[1] if len(varied.keys) > 1 else ""
-            values = (varied.keys[0], varied.value(entry), by, varied.value(entry, 1), record.parameters)
+            iou, parameters = entry.estimate(HEADLINE), entry.row.results[0].record.parameters
+            values = (setting, varied.value(entry), by, varied.value(entry, 1), parameters)
             lines.append((_name(index), entry.row.name, *values, iou.value, iou.low, iou.high, _window_ms(entry)))
     return pd.DataFrame(lines, columns=list(COLUMNS)).astype({"parameters": "Int64"})
 
@@ -68,8 +68,7 @@ def _draw_line(panels: Sequence[Axes], varied: Varied, line: list[RowScores], in
     time.plot(places, times, "o-", color=colour, label=label, markersize=4)
     front.plot(times, values, "o", color=colour, label=label, markersize=4)
     for entry, at, value in zip(line, times, values, strict=True):
-        text = f"{varied.value(entry):g}"
-        front.annotate(text, (at, value), (4, -9), textcoords="offset points", fontsize=7)
+        front.annotate(f"{varied.value(entry):g}", (at, value), (4, -9), textcoords="offset points", fontsize=7)
 
 
 def _front_line(axes: Axes, entries: Sequence[RowScores]) -> None:

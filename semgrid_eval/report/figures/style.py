@@ -29,19 +29,14 @@ SETTINGS: Any = {
     "svg.hashsalt": "semgrid-eval",
     "axes.facecolor": "none",  # a page in the dark has no white boxes
     "axes.edgecolor": RULE,
-    "axes.labelcolor": INK,
-    "axes.titlecolor": INK,
+    **dict.fromkeys(("axes.labelcolor", "axes.titlecolor", "text.color", "xtick.color", "ytick.color"), INK),
     "axes.titlesize": 10,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
+    **dict.fromkeys(("axes.spines.top", "axes.spines.right"), False),
     "axes.axisbelow": True,
     "axes.grid": True,
     "axes.grid.axis": "y",
     "grid.color": RULE,
     "grid.linewidth": 0.6,
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
     "legend.frameon": False,
 }
 PAPER_MARKS: Any = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.8}
@@ -65,15 +60,13 @@ class Plot:
     @property
     def themed_svg(self) -> str:
         """The SVG with colours that follow the reader's light or dark setting, and without a background."""
-        light = "".join(f"--c{i}:{colour};" for i, colour in enumerate(_DARK))
-        dark = "".join(f"--c{i}:{colour};" for i, colour in enumerate(_DARK.values()))
+        light, dark = ("".join(f"--c{i}:{c};" for i, c in enumerate(each)) for each in (_DARK, _DARK.values()))
         media = f"@media (prefers-color-scheme:dark){{:root{{{dark}}}}}"
         style = f"<style>:root{{{light}}}{media}#patch_1{{display:none}}</style>"
         text = self.svg
         for i, colour in enumerate(_DARK):
             text = text.replace(colour, f"var(--c{i})")
-        head, tail = text.split("<defs>", 1)
-        return f"{head}{style}<defs>{tail}"
+        return text.replace("<defs>", f"{style}<defs>", 1)
 
 
 def evidence(scores: Scores) -> str:

@@ -36,8 +36,8 @@ def training_plots(rows: Sequence[Row]) -> list[Plot]:
     with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=(9.0, 3.4), layout="constrained")
         axes = figure.add_subplot()
-        for index, row in enumerate(trained):
-            _training_curves(axes, row, index + 1)
+        for index, row in enumerate(trained, start=1):
+            _draw_curves(axes, row, line_style(index))
         axes.set(xlabel="epoch", ylabel="loss: mean cross-entropy of a cell", yscale="log")
         for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
             ticks(StrMethodFormatter("{x:g}"))
@@ -47,19 +47,12 @@ def training_plots(rows: Sequence[Row]) -> list[Plot]:
         return [finish(figure, "training", "training.csv", caption)]
 
 
-def _training_curves(axes: Axes, row: Row, index: int) -> None:
-    style = line_style(index)
-    curves = [_curve(result.history, "loss") for result in row.results]
-    for curve in curves:
+def _draw_curves(axes: Axes, row: Row, style: dict[str, Any]) -> None:
+    for curve in (_curve(result.history, "loss") for result in row.results):
         axes.plot(range(1, len(curve) + 1), curve, linewidth=0.7, alpha=0.6, **style)
-    checks = [_curve(result.history, "validation_loss") for result in row.results]
-    shortest = min((len(check) for check in checks if check), default=0)
-    mean = np.array([check[:shortest] for check in checks if check], np.float64).reshape(-1, shortest).mean(axis=0)
-    label = short(row.name)
-    if np.isfinite(mean).any():
-        axes.plot(range(1, shortest + 1), mean, linewidth=2, label=label, **style)
-    else:
-        axes.plot([], [], label=label, **style)
+    checks = [check for result in row.results if (check := _curve(result.history, "validation_loss"))]
+    mean = [float(np.mean(losses)) for losses in zip(*checks, strict=False)]  # as far as the shortest goes
+    axes.plot(range(1, len(mean) + 1), mean, linewidth=2, label=short(row.name), **style)
 
 
 def _curve(history: Any, column: str) -> list[float]:  # noqa: ANN401 - a data frame or None

@@ -1,18 +1,19 @@
 """Where a report's numbers come from: failures, logs, results, versions and the commands that made them."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 import yaml
 
 from semgrid_eval.files import digest_value
-from semgrid_eval.report.claims.scaling import scaling
+from semgrid_eval.report.claims.paper import scaling
 from semgrid_eval.report.page.commands import row_command
 from semgrid_eval.report.rows.load import Row, Run
-from semgrid_eval.report.tables.table import Cell, Line, Table, plural
-from semgrid_eval.scores.results import NOT_RUN, LogRecord, RunRecord
+from semgrid_eval.report.tables.table import Cell, Line, Table, plain_table, plural
+from semgrid_eval.scores.results import NOT_RUN, LogRecord, ResultRecord, RunRecord
 from semgrid_eval.sources.benchmarks import FINGERPRINT_CHARACTERS, published_fingerprints
 
 WINDOW_COLUMNS = ("window_set", "recording", "log", "target_frame", "target_stamp_ns", "input_stamps_ns")
@@ -27,27 +28,17 @@ class Failure:
     reason: str
 
 
-@dataclass(frozen=True)
-class Facts:
-    """What a page says of how one run was made."""
-
-    entries: tuple[tuple[str, str], ...]
-    scaling: str
-    matrix: str
-    matrix_file: str
-
-
 def failures(runs: Sequence[Run]) -> list[Failure]:
     """List the rows, results and logs that failed."""
     found = []
     for run in runs:
         found += [Failure("row", row.name, reason) for row in run.rows for reason in row.failures]
-        found += [Failure("log", path, reason) for path, reason in sorted(run.record.failed_logs.items())]
+        found += [Failure("log", *reason) for reason in sorted(run.record.failed_logs.items())]
     return found
 
 
-def facts(run: Run, runs: Sequence[Run]) -> Facts:
-    """List how a run was made."""
+def facts(run: Run, runs: Sequence[Run]) -> dict[str, Any]:
+    """Return what the page says of how a run was made."""
     record = run.record
     entries = [
         ("Title", record.title),
@@ -58,7 +49,8 @@ def facts(run: Run, runs: Sequence[Run]) -> Facts:
         *((f"Version of {name}", version) for name, version in sorted(record.versions.items())),
         *((f"Machine: {name.replace('_', ' ')}", value) for name, value in sorted(record.machine.items())),
     ]
-    return Facts(tuple(entries), scaling(run), matrix_text(run), matrix_file(run, runs))
+    matrix = {"matrix": matrix_text(run), "matrix_file": matrix_file(run, runs)}
+    return {"entries": entries, "scaling": scaling(run), **matrix}
 
 
 def data_sets(record: RunRecord) -> list[str]:
@@ -66,27 +58,23 @@ def data_sets(record: RunRecord) -> list[str]:
 
     Of a published benchmark, say whether they are its logs.
     """
-    found: dict[str, list[LogRecord]] = {}
-    for log in record.logs:
-        found.setdefault(log.dataset, []).append(log)
-    return [_data_set(name, logs) for name, logs in sorted(found.items())]
+    names = sorted({log.dataset for log in record.logs})
+    return [_data_set(name, [log for log in record.logs if log.dataset == name]) for name in names]
 
 
 def _data_set(name: str, logs: Sequence[LogRecord]) -> str:
     digest = digest_value(sorted((log.split, log.name, log.digest) for log in logs))
-    text = f"{name}: {_by_split(log.split for log in logs)}; digest {digest}"
+    splits = Counter(log.split for log in logs)
+    shares = " and ".join(f"{plural(count, 'log')} of {split}" for split, count in sorted(splits.items()))
+    text = f"{name}: {shares}; digest {digest}"
     published = published_fingerprints(name)
     # A log to train on and to score is there twice.
     known = {log.digest: (log.fingerprint or "")[:FINGERPRINT_CHARACTERS] for log in logs}
-    if not published or not any(known.values()):  # runs of older versions know none
+    if not published or not any(known.values()):
         return text
     if others := sum(fingerprint not in published for fingerprint in known.values()):
         return f"{text}; {others} of {len(known)} are not as published"
     return f"{text}; {'all' if len(known) == len(published) else f'{len(known)} of {len(published):,}'}, as published"
-
-
-def _by_split(splits: Iterable[str]) -> str:
-    return " and ".join(f"{plural(count, 'log')} of {split}" for split, count in sorted(Counter(splits).items()))
 
 
 def matrix_text(run: Run) -> str:
@@ -101,18 +89,17 @@ def matrix_file(run: Run, runs: Sequence[Run]) -> str:
 
 def command_table(runs: Sequence[Run]) -> Table:
     """Show what each row does and the command line that makes it again."""
-    bodies = []
-    for run in runs:
-        for row in run.rows:
-            command = row_command(run.record.command, row.record.name, matrix_file(run, runs))
-            cells = (Cell(row.record.label), Cell(_state(row)), Cell(command, tone="command"))
-            bodies.append((Line(row.name, cells),))
     caption = (
         "The command that makes each row again. A run keeps the results that its --out folder already holds; "
         "name another folder to start over."
     )
-    columns = tuple((text, "") for text in ("What it does", "Results", "Command"))
-    return Table("commands", caption, "Row", columns, tuple(bodies))
+    lines = []
+    for run in runs:
+        for row in run.rows:
+            command = row_command(run.record.command, row.record.name, matrix_file(run, runs))
+            cells = (Cell(row.record.label), Cell(_state(row)), Cell(command, tone="command"))
+            lines.append(Line(row.name, cells))
+    return plain_table("commands", caption, "Row", ("What it does", "Results", "Command"), lines)
 
 
 def window_frame(runs: Sequence[Run]) -> pd.DataFrame:
@@ -138,30 +125,29 @@ def _state(row: Row) -> str:
 def log_table(runs: Sequence[Run]) -> Table:
     """List the logs by their paths, which example windows name, too, with their digests."""
     logs = {(log.path, log.digest): log for run in runs for log in run.record.logs}
-    bodies = tuple((Line(log.path, (Cell(log.dataset), Cell(log.split), Cell(log.digest))),) for log in logs.values())
-    columns = tuple((text, "") for text in ("Data set", "Split", "Digest"))
-    return Table("logs", "Logs that took part, by their paths below the folder of logs", "Log", columns, bodies)
+    lines = [Line(log.path, (Cell(log.dataset), Cell(log.split), Cell(log.digest))) for log in logs.values()]
+    caption = "Logs that took part, by their paths below the folder of logs"
+    return plain_table("logs", caption, "Log", ("Data set", "Split", "Digest"), lines)
 
 
 def result_table(runs: Sequence[Run]) -> Table:
     """List every result: its row, seed, id, windows and cost."""
-    bodies = []
-    for run in runs:
-        for row in run.rows:
-            for result in row.results:
-                record = result.record
-                cells = (
-                    Cell("none" if record.seed is None else str(record.seed), record.seed),
-                    Cell(record.id),
-                    Cell(record.windows_id),
-                    Cell(f"{len(record.windows):,}", len(record.windows)),
-                    _seconds(record.train_seconds),
-                    _seconds(record.predict_seconds),
-                    Cell(record.device),
-                )
-                bodies.append((Line(row.name, cells, title=row.record.label),))
+    rows = [row for run in runs for row in run.rows]
+    lines = [Line(row.name, _result(each.record), title=row.record.label) for row in rows for each in row.results]
     names = ("Seed", "Result", "Window set", "Windows", "Training", "Prediction", "Device")
-    return Table("results", "Results behind the rows", "Row", tuple((name, "") for name in names), tuple(bodies))
+    return plain_table("results", "Results behind the rows", "Row", names, lines)
+
+
+def _result(record: ResultRecord) -> tuple[Cell, ...]:
+    return (
+        Cell("none" if record.seed is None else str(record.seed), record.seed),
+        Cell(record.id),
+        Cell(record.windows_id),
+        Cell(f"{len(record.windows):,}", len(record.windows)),
+        _seconds(record.train_seconds),
+        _seconds(record.predict_seconds),
+        Cell(record.device),
+    )
 
 
 def duration(seconds: float) -> str:

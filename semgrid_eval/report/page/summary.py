@@ -1,13 +1,13 @@
 """What the numbers say, in a few plain sentences and a few large figures."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, Scores
 from semgrid_eval.report.rows.load import Row, Run, key_of
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, Headline, verdict
-from semgrid_eval.report.tables.table import interval, interval_phrase, number, plural, signed
+from semgrid_eval.report.tables.table import MINUS, interval, interval_phrase, number, plural, signed
 
 _FEW_RECORDINGS, _FEW_SEEDS = 10, 5
 _WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
@@ -15,20 +15,17 @@ _WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearl
 
 @dataclass(frozen=True)
 class Tile:
-    """One difference, large: its label, the value, its interval and where they lie on a common axis (percent).
-
-    `title` tells what stands behind it.
-    """
+    """One difference, large: its label, the value, its interval and where they lie on a common axis (percent)."""
 
     label: str
     value: str
     note: str
     tone: str
     word: str
-    low: float
-    high: float
-    at: float
-    title: str
+    title: str  # what stands behind it
+    at: float = 50.0
+    low: float = 50.0
+    high: float = 50.0
 
 
 @dataclass(frozen=True)
@@ -42,18 +39,22 @@ class Summary:
 
 def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None) -> Summary:
     """Put a report into a few sentences."""
-    sentences = [_which(scores, found), _against_reference(scores, found), _evidence(runs, scores)]
-    compared, tiles = _tiles(scores, found)
-    return Summary(tuple(sentence for sentence in sentences if sentence), compared, tiles)
+    which, evidence = _which(scores, found), _evidence(runs, scores)
+    if found is None or (pair := _pair(found)) is None:
+        return Summary((which, evidence), "", ())
+    model, other = pair
+    differences = {column: scores[model.name].minus(scores[other.name], column) for column in DIFFERENCE_COLUMNS}
+    against = _in_words(model, other, differences)
+    tiles = _tiles(model, other, differences)
+    sentences = (which, against, evidence) if against else (which, evidence)
+    return Summary(sentences, f"{model.name} {MINUS} {other.name}", tiles)
 
 
 def _which(scores: Scores, found: Headline | None) -> str:
     if found is None:
         return "No row has a score: nothing can be compared."
     best = scores[found.best.name]
-    among = (
-        "" if found.compared == len(scores) else f"Of {found.compared} rows with the same targets, inputs and horizon, "
-    )
+    among = f"Of {found.compared} rows with the same targets, inputs and horizon, " * (found.compared < len(scores))
     start = f"{among}{found.best.name} has the highest mean class IoU, {number(best.mean[HEADLINE])} without unknown"
     if found.rival is None:
         return f"{start} ({interval_phrase(best.estimate(HEADLINE))}); there is no other row to compare with."
@@ -63,17 +64,12 @@ def _which(scores: Scores, found: Headline | None) -> str:
     return f"{start}: {signed(lead.value)} over {found.rival.name}, {kind}, {word} ({phrase})."
 
 
-def _against_reference(scores: Scores, found: Headline | None) -> str:
-    model, other = _pair(found)
-    if model is None or other is None:
-        return ""
+def _in_words(model: Row, other: Row, differences: Mapping[str, Estimate]) -> str:
     groups: dict[str, list[str]] = {}
-    for column in DIFFERENCE_COLUMNS[:-1]:
-        difference = scores[model.name].minus(scores[other.name], column)
-        if not isfinite(difference.value):  # a class that is nowhere
-            continue
-        text = f"{LABELS[column].lower()} ({signed(difference.value)})"
-        groups.setdefault(verdict(difference), []).append(text)
+    for column, difference in differences.items():
+        if column != HEADLINE and isfinite(difference.value):  # not finite: a class that is nowhere
+            text = f"{LABELS[column].lower()} ({signed(difference.value)})"
+            groups.setdefault(verdict(difference), []).append(text)
     parts = [f"{_WORDS[word]} on {_listed(groups[word])}" for word in _WORDS if word in groups]
     return f"Against {other.name}, {model.name} is {'; '.join(parts)}." if parts else ""
 
@@ -105,42 +101,31 @@ def _doubt(recordings: int, seeds: Sequence[int]) -> str:
     return "".join(doubts)
 
 
-def _tiles(scores: Scores, found: Headline | None) -> tuple[str, tuple[Tile, ...]]:
-    model, other = _pair(found)
-    if model is None or other is None:
-        return "", ()
-    differences = {c: scores[model.name].minus(scores[other.name], c) for c in DIFFERENCE_COLUMNS}
-    bounds = [abs(v) for d in differences.values() for v in (d.value, d.low, d.high) if v == v]
+def _tiles(model: Row, other: Row, differences: Mapping[str, Estimate]) -> tuple[Tile, ...]:
+    bounds = [abs(v) for d in differences.values() for v in (d.value, d.low, d.high) if isfinite(v)]
     reach = 1.1 * max([*bounds, 1e-3])
-    behind = f"{_results(model)} and {_results(other)}, {plural(model.windows, 'window')}"
-    tiles = tuple(_tile(LABELS[column], difference, reach, behind) for column, difference in differences.items())
-    return f"{model.name} \N{MINUS SIGN} {other.name}", tiles
-
-
-def _results(row: Row) -> str:
-    return f"{plural(len(row.results), 'result')} of {row.name}"
+    results = " and ".join(f"{plural(len(row.results), 'result')} of {row.name}" for row in (model, other))
+    behind = f"{results}, {plural(model.windows, 'window')}"
+    return tuple(_tile(LABELS[column], difference, reach, behind) for column, difference in differences.items())
 
 
 def _tile(label: str, difference: Estimate, reach: float, behind: str) -> Tile:
-    def place(value: float) -> float:
-        return round(50 + 50 * (value if value == value else difference.value) / reach, 1)
-
-    tone = verdict(difference)
+    value, tone = signed(difference.value), verdict(difference)
     title = f"{label}: {behind}; {interval_phrase(difference, with_sign=True)}"
-    if difference.value != difference.value:
-        return Tile(label, signed(difference.value), "", tone, "absent", 50.0, 50.0, 50.0, title)
+    if not isfinite(difference.value):
+        return Tile(label, value, "", tone, "absent", title)
+    ends = (v if isfinite(v) else difference.value for v in (difference.value, difference.low, difference.high))
+    places = (round(50 + 50 * end / reach, 1) for end in ends)
     note = interval(difference, with_sign=True) or "no interval"
-    low, high, at = place(difference.low), place(difference.high), place(difference.value)
-    return Tile(label, signed(difference.value), note, tone, _WORDS[tone], low, high, at, title)
+    return Tile(label, value, note, tone, _WORDS[tone], title, *places)
 
 
-def _pair(found: Headline | None) -> tuple[Row | None, Row | None]:
+def _pair(found: Headline) -> tuple[Row, Row] | None:
     """Choose the two rows that the head of the page compares, a baseline as the second."""
-    if found is None:
-        return None, None
     if found.rival is not None and found.best.is_baseline and not found.rival.is_baseline:
         return found.rival, found.best
-    return found.best, found.reference or found.rival
+    other = found.reference or found.rival
+    return None if other is None else (found.best, other)
 
 
 def _kind(best: Row, rival: Row) -> str:

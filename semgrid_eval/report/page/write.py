@@ -1,7 +1,6 @@
 """Writes a report: one self-contained page, tables for people and for machines, and figures."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -18,17 +17,15 @@ from semgrid_eval.report.claims.paper import in_paper
 from semgrid_eval.report.estimates.bootstrap import Parts, Scores
 from semgrid_eval.report.estimates.paces import EDGES_MPS
 from semgrid_eval.report.estimates.resampling import Level, Resampling
-from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, data_uri
+from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, class_style, data_uri
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
 from semgrid_eval.report.page import provenance
-from semgrid_eval.report.page.colours import class_style
 from semgrid_eval.report.page.material import Material, gather
 from semgrid_eval.report.page.summary import summarise
 from semgrid_eval.report.rows.load import Row, load_runs
 from semgrid_eval.report.rows.pairing import Headline, headline
 from semgrid_eval.report.tables import write as exports
-from semgrid_eval.report.tables.divisions import division_tables
-from semgrid_eval.report.tables.scores import confusion_table, score_tables
+from semgrid_eval.report.tables.scores import confusion_table
 from semgrid_eval.report.tables.table import Table
 
 PAGE = "index.html"
@@ -55,50 +52,22 @@ def write_report(
     out = folders[0] / "report" if out is None else out
     _check_replaceable(out)
     material = gather(load_runs(folders, progress=progress), Resampling(_SEED, level=resample))
-    tables = page_tables(material)
     with atomic_folder(out) as folder:
         exports.write_numbers(folder, material)
-        exports.write_tables(folder, all_tables(tables))
+        exports.write_tables(folder, material.all_tables)
         exports.write_figures(folder, material.figures)
-        (folder / PAGE).write_text(render_page(material, tables), encoding="utf-8")
+        (folder / PAGE).write_text(render_page(material), encoding="utf-8")
     return out / PAGE
 
 
-@dataclass(frozen=True)
-class PageTables:
-    """The page's tables of scores: of all cells by name, and of every metric by division."""
-
-    scores: Mapping[str, Table | None]
-    divisions: Mapping[str, Sequence[Table]]
-
-
-def page_tables(material: Material) -> PageTables:
-    """Make the page's tables of scores."""
-    return PageTables(
-        score_tables(material.scores, [each.tag for each in material.runs]),
-        division_tables(material.everything, material.divisions),
-    )
-
-
-def all_tables(tables: PageTables) -> list[Table]:
-    """List the page's tables of scores that have something to show."""
-    found = [*tables.scores.values(), *(table for each in tables.divisions.values() for table in each)]
-    return [table for table in found if table is not None and table.bodies]
-
-
-def render_page(material: Material, tables: PageTables) -> str:
+def render_page(material: Material) -> str:
     """Render the page as HTML that needs nothing but itself."""
     runs, scores = material.runs, material.scores
     found = headline(scores)
     rows = [entry.row for entry in scores.values()]
     examples = example_groups(runs, rows, found)
-    environment = Environment(
-        loader=PackageLoader("semgrid_eval.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    loader, strict = PackageLoader("semgrid_eval.report"), StrictUndefined
+    environment = Environment(loader=loader, autoescape=True, undefined=strict, trim_blocks=True, lstrip_blocks=True)
     environment.filters["svg_uri"] = lambda text: data_uri(text.encode(), "image/svg+xml")
     return environment.get_template("page.html.j2").render(
         style=Markup(class_style()) + _source("style.css") + _source("examples.css"),
@@ -108,8 +77,8 @@ def render_page(material: Material, tables: PageTables) -> str:
         title=", ".join(each.record.title for each in runs),
         summary=summarise(runs, scores, found),
         resampled=material.resampling.sentence,
-        tables=tables.scores,
-        parts=tables.divisions,
+        tables=material.tables,
+        parts=material.parts,
         about_settings=sum(not in_paper(e.row.record.name) for e in scores.values()) > len(scores) / 2,
         findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
         margin=MARGIN,
@@ -121,7 +90,7 @@ def render_page(material: Material, tables: PageTables) -> str:
         gaps=gaps(rows, examples),
         widths=widths(rows),
         stands_mps=EDGES_MPS[0],
-        unpaced=rows_without(material.parts["paces"], rows),
+        unpaced=rows_without(material.everything["iou"]["paces"], rows),
         failures=provenance.failures(runs),
         logs=provenance.log_table(runs),
         results=provenance.result_table(runs),
@@ -138,18 +107,14 @@ def rows_without(parts: Parts, rows: Sequence[Row]) -> list[str]:
 
 def finding_view(tag: str, index: int, findings: Sequence[Finding]) -> dict[str, object]:
     """Make what the page shows of one run's findings."""
-    mine = [each for each in findings if each.run == tag]
-    return {
-        "tag": tag,
-        "sentence": sentence(mine),
-        "tested": finding_table(f"findings-{index}" if index else "findings", mine),
-        "missing": missing_table(f"not-run-{index}" if index else "not-run", mine),
-    }
+    mine, end = [each for each in findings if each.run == tag], f"-{index}" if index else ""
+    tested, missing = finding_table(f"findings{end}", mine), missing_table(f"not-run{end}", mine)
+    return {"tag": tag, "sentence": sentence(mine), "tested": tested, "missing": missing}
 
 
 def confusion_tables(scores: Scores, found: Headline | None) -> list[Table]:
     """Make the confusion tables of the best row and of the baseline it is measured against."""
-    rows = [] if found is None else [row for row in (found.best, found.reference or found.rival) if row is not None]
+    rows = () if found is None else filter(None, (found.best, found.reference or found.rival))
     return [confusion_table(scores[row.name], f"confusion-{i}") for i, row in enumerate(rows)]
 
 

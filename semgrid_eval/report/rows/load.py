@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,6 @@ from semgrid_eval.scores.results import (
 WindowReader = Callable[[Path, str], Mapping[str, NDArray[Any]]]
 """Reads a set of windows, as `scores.results.read_windows` does, from a run by its id."""
 
-
 SumsReader = Callable[[str, str], NDArray[np.int32] | None]
 """Reads what a metric counted by a partition, as `scores.results.read_sums` does from a result's folder."""
 
@@ -58,11 +58,6 @@ class Result:
         """The names (R,) of the drives that windows come from, and the index of each window's (N,)."""
         names, owner = np.unique([window.drive for window in self.record.windows], return_inverse=True)
         return names, owner
-
-    @cached_property
-    def log_of(self) -> Mapping[str, str]:
-        """The path of the log of each drive."""
-        return {window.drive: window.log for window in self.record.windows}
 
     @cached_property
     def grid(self) -> GridConfig | None:
@@ -97,7 +92,7 @@ class Row:
     results: tuple[Result, ...]
     failures: tuple[str, ...]
     run: Path
-    groups: Mapping[str, str] = field(default_factory=dict)  # by a log's path: the town, city or drive it belongs to
+    groups: Mapping[str, str] = field(default_factory=dict)  # by a log's path
 
     @property
     def is_left(self) -> bool:
@@ -109,10 +104,11 @@ class Row:
         """Whether other rows are measured against this one."""
         return self.record.facts.baseline
 
-    @property
-    def learns(self) -> bool:
-        """Whether its model was fitted to training windows."""
-        return self.record.facts.learns
+    @cached_property
+    def group_of(self) -> Mapping[str, str]:
+        """The group that each drive belongs to: a town, city or drive, by default the drive itself."""
+        windows = (window for result in self.results for window in result.record.windows)
+        return {window.drive: self.groups.get(window.log) or window.drive for window in windows}
 
     @property
     def targets(self) -> str:
@@ -158,13 +154,12 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
         InputError: a run's record is missing or malformed. Faulty results are failures of their rows instead.
     """
     records = [read_run(folder) for folder in folders]
-    total, done, runs = sum(len(record.rows) for record in records), 0, []
+    total, done, runs = sum(len(record.rows) for record in records), count(1), []
     for folder, tag, record in zip(folders, _tags(folders), records, strict=True):
         rows, load = [], _Loader(folder, {log.path: log.group for log in record.logs})
         for row in record.rows:
             rows.append(load.row(row, f"{row.name} ({tag})" if tag else row.name))
-            done += 1
-            progress(done, total, row.name)
+            progress(next(done), total, row.name)
         runs.append(Run(folder, tag, record, tuple(rows)))
     return tuple(runs)
 
@@ -183,10 +178,7 @@ def _flat(config: Mapping[str, object], prefix: str = "") -> dict[str, Any]:
     """Flatten nested settings to dotted names."""
     found: dict[str, Any] = {}
     for key, value in config.items():
-        if isinstance(value, Mapping):
-            found |= _flat(value, f"{prefix}{key}.")
-        else:
-            found[f"{prefix}{key}"] = value
+        found |= _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
     return found
 
 

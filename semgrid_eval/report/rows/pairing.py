@@ -45,14 +45,8 @@ def reference_of(row: Row, rows: Sequence[Row]) -> Row | None:
     """
     if row.is_baseline:
         return None
-    choices = [
-        other
-        for other in rows
-        if other.is_baseline
-        and other.run == row.run
-        and comparable(row, other)
-        and _frames_ahead(other) == _frames_ahead(row)
-    ]
+    baselines = (other for other in rows if other.is_baseline and other.run == row.run and comparable(row, other))
+    choices = [other for other in baselines if _frames_ahead(other) == _frames_ahead(row)]
     return max(choices, key=lambda other: _nearness(row, other), default=None)
 
 
@@ -94,10 +88,5 @@ def _frames_ahead(row: Row) -> int:
 def _nearness(row: Row, other: Row) -> tuple[bool, ...]:
     """Order baselines by how much of the row's question they share."""
     mine, theirs = row.record.facts, other.record.facts
-    return (
-        mine.sensors == theirs.sensors,
-        mine.translate == theirs.translate,
-        mine.inputs == theirs.inputs,
-        mine.step_frames == theirs.step_frames,
-        not theirs.learns,
-    )
+    shared = (mine.sensors == theirs.sensors, mine.translate == theirs.translate, mine.inputs == theirs.inputs)
+    return (*shared, mine.step_frames == theirs.step_frames, not theirs.learns)

@@ -6,45 +6,54 @@ from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
 from semgrid_eval.report.rows.load import Row, comparable
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, main_group, shared_windows
 from semgrid_eval.report.rows.settings import changed_settings, changed_targets, settings_of
-from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, interval_phrase, number, plural
+from semgrid_eval.report.tables.table import (
+    MINUS,
+    Cell,
+    Line,
+    Table,
+    difference_cell,
+    interval_phrase,
+    number,
+    plain_table,
+    plural,
+)
 
 
 def changes_table(scores: Scores) -> Table | None:
     """Show what each row changes against the row of its model above it that it is closest to, and what that does."""
-    entries, bodies = list(scores.values()), []
+    entries, lines = list(scores.values()), []
     for at, entry in enumerate(entries):
         base = _closest(entry, entries[:at])
         changed = changed_settings(settings_of(base.row), settings_of(entry.row)).values() if base else ()
         if base is None or not changed:
             continue
         cells = (Cell("; ".join(changed)), *(_change(entry, base, column) for column in DIFFERENCE_COLUMNS))
-        bodies.append((Line(_pair(entry, base), cells),))
+        sign = MINUS if comparable(entry.row, base.row) else "beside"
+        lines.append(Line(f"{entry.row.name} {sign} {base.row.name}", cells))
     caption = (
         "What each row changes against the row above it that has the same model and the fewest other settings, "
         "and the difference of their scores. Where the targets are others, both scores are shown instead."
     )
-    columns = (("Settings", ""), *((LABELS[column], "") for column in DIFFERENCE_COLUMNS))
-    return Table("changes", caption, "Rows", columns, tuple(bodies)) if bodies else None
+    columns = ["Settings", *(LABELS[column] for column in DIFFERENCE_COLUMNS)]
+    return plain_table("changes", caption, "Rows", columns, lines) if lines else None
 
 
 def not_compared_table(scores: Scores) -> Table | None:
     """List the rows whose targets are others than those of the main group, and what makes them so."""
     rows = [entry.row for entry in scores.values()]
-    main = main_group(rows)[:1]
     groups: dict[str, list[Row]] = {}
     for row in rows:
-        if not comparable(row, main[0]):
-            groups.setdefault(row.targets, []).append(row)
-    with_main = [row for row in rows if comparable(row, main[0])]
-    bodies = tuple((_other_targets(group, with_main),) for group in groups.values())
+        groups.setdefault(row.targets, []).append(row)
+    if len(groups) < 2:
+        return None
+    main = main_group(rows)[0]
+    with_main = groups.pop(main.targets)
     caption = (
-        f"Not compared with {main[0].name} and the rows that share its targets. Scores are subtracted only between "
+        f"Not compared with {main.name} and the rows that share its targets. Scores are subtracted only between "
         "rows with the same targets: the same frames of the same logs, grid, mask mode and split."
-        if main
-        else ""
     )
-    columns = (("What differs", ""), ("Windows", ""))
-    return Table("not-compared", caption, "Rows with the same targets", columns, bodies) if bodies else None
+    lines = [_other_targets(group, with_main) for group in groups.values()]
+    return plain_table("not-compared", caption, "Rows with the same targets", ("What differs", "Windows"), lines)
 
 
 def _other_targets(group: Sequence[Row], with_main: Sequence[Row]) -> Line:
@@ -63,19 +72,13 @@ def _other_targets(group: Sequence[Row], with_main: Sequence[Row]) -> Line:
 def _closest(entry: RowScores, above: Sequence[RowScores]) -> RowScores | None:
     """Find the row of the same model and run with the fewest other settings, rather one with the same targets."""
     mine = entry.row
-    alike = [
-        other for other in above if (other.row.record.facts.model, other.row.run) == (mine.record.facts.model, mine.run)
-    ]
-    return min(alike, key=lambda other: _distance(mine, other.row), default=None)
 
+    def distance(other: RowScores) -> tuple[int, bool]:
+        changed = changed_settings(settings_of(other.row), settings_of(mine))
+        return len(changed), not comparable(mine, other.row)
 
-def _distance(row: Row, base: Row) -> tuple[int, bool]:
-    return len(changed_settings(settings_of(base), settings_of(row))), not comparable(row, base)
-
-
-def _pair(entry: RowScores, base: RowScores) -> str:
-    sign = "\N{MINUS SIGN}" if comparable(entry.row, base.row) else "beside"
-    return f"{entry.row.name} {sign} {base.row.name}"
+    alike = (e for e in above if (e.row.record.facts.model, e.row.run) == (mine.record.facts.model, mine.run))
+    return min(alike, key=distance, default=None)
 
 
 def _change(entry: RowScores, base: RowScores, column: str) -> Cell:

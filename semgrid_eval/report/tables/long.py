@@ -10,12 +10,13 @@ from semgrid_eval.report.estimates.bootstrap import Estimate, Everything, RowSco
 from semgrid_eval.report.tables.table import finite
 from semgrid_eval.report.tables.values import reference_scores
 from semgrid_eval.scores.metrics.metric import column_names
+from semgrid_eval.scores.tidy import FIGURE_COLUMNS
 
 SUMMARY_COLUMNS = (
     *("row", "metric", "division", "region", "column", "value", "low", "high"),
     *("reference", "difference", "difference_low", "difference_high", "cells", "windows", "seeds"),
 )
-SEED_COLUMNS = ("row", "seed", "metric", "division", "region", "column", "value", "cells", "windows")
+_DIFFERENCE = {"value": "difference", "low": "difference_low", "high": "difference_high"}
 
 Records = Mapping[str, Mapping[str, Mapping[str, Mapping[str, dict[str, Any]]]]]
 """What machines may want to know of a row, by the names of metric, division, region and row."""
@@ -26,7 +27,9 @@ T = TypeVar("T")
 def summary_frame(records: Records) -> pd.DataFrame:
     """Return one line for every figure of `division_records`."""
     lines = [
-        {**place, "row": name, "column": column, **_numbers(record, column)}
+        {**place, "row": name, **record, "column": column, "cells": record["cells"][column]}
+        | record["scores"][column]
+        | {_DIFFERENCE[key]: value for key, value in record["differences"].get(column, {}).items()}
         for place, region in _regions(records)
         for name, record in region.items()
         for column in record["scores"]
@@ -37,7 +40,7 @@ def summary_frame(records: Records) -> pd.DataFrame:
 def seed_frame(everything: Everything) -> pd.DataFrame:
     """Return one line for every figure of every row and seed."""
     parts = [_seeds(entry, place) for place, scores in _regions(everything) for entry in scores.values()]
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(SEED_COLUMNS))
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(FIGURE_COLUMNS))
 
 
 def division_records(everything: Everything) -> Records:
@@ -77,22 +80,9 @@ def _estimate(estimate: Estimate) -> dict[str, float | None]:
     return {name: finite(value) for name, value in vars(estimate).items()}
 
 
-def _numbers(record: dict[str, Any], column: str) -> dict[str, Any]:
-    difference = record["differences"].get(column, {})
-    return {
-        **record["scores"][column],
-        "reference": record["reference"],
-        "difference": difference.get("value"),
-        **{f"difference_{end}": difference.get(end) for end in ("low", "high")},
-        "cells": record["cells"][column],
-        "windows": record["windows"],
-        "seeds": record["seeds"],
-    }
-
-
 def _seeds(entry: RowScores, place: _Place) -> pd.DataFrame:
     columns = column_names(entry.metric)
     seed = pd.array([result.record.seed for result in entry.results], dtype="Int64").repeat(len(columns))
     frame = pd.DataFrame({"seed": seed, "column": list(columns) * len(entry.results), "value": entry.by_seed.ravel()})
     cells = np.asarray(entry.metric.cells(entry.totals)).ravel()
-    return frame.assign(row=entry.row.name, **place, cells=cells, windows=entry.windows)[list(SEED_COLUMNS)]
+    return frame.assign(row=entry.row.name, **place, cells=cells, windows=entry.windows)[list(FIGURE_COLUMNS)]

@@ -1,17 +1,20 @@
-"""The page's tables of IoU over all cells, of what is taken for what, and of what each row cost."""
+"""The page's tables of scores: of all cells, of every metric in every division, of confusions, and of costs."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.report.estimates.bootstrap import CATEGORY_COLUMNS, LABELS, MERGED_COLUMNS, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import LABELS, Everything, Parts, RowScores, Scores
+from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.rows.load import Result
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS
 from semgrid_eval.report.tables.changes import changes_table, not_compared_table
-from semgrid_eval.report.tables.table import ABSENT, Cell, Line, Table, plain_cell, plural
-from semgrid_eval.report.tables.values import difference_table, run_differences, seeds, value_table
+from semgrid_eval.report.tables.table import ABSENT, Cell, Line, Table, plain_cell, plain_table, plural
+from semgrid_eval.report.tables.values import difference_table, run_differences, seeds, side_by_side, value_table
+from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS, MERGED_COLUMNS
 from semgrid_eval.scores.metrics.metric import Floats, Metric, divided
+from semgrid_eval.scores.metrics.table import IOU, METRICS
 
 _PAPER = (
     "The paper's values (Table A1) come from Cityscapes' validation set; "
@@ -46,9 +49,9 @@ def score_tables(scores: Scores, tags: Sequence[str]) -> dict[str, Table | None]
 
 def window_means(scores: Scores) -> Table:
     """Show the mean over windows of each window's own scores, where the other tables pool their counts."""
-    bodies = tuple((Line(name, _window_cells(entry)),) for name, entry in scores.items())
+    lines = [Line(name, _window_cells(entry)) for name, entry in scores.items()]
     caption = "Mean over windows of each window's own category scores; windows without a category are left out."
-    return Table("windows", caption, "Row", tuple((LABELS[column], "") for column in CATEGORY_COLUMNS), bodies)
+    return plain_table("windows", caption, "Row", [LABELS[column] for column in CATEGORY_COLUMNS], lines)
 
 
 def _window_cells(entry: RowScores) -> tuple[Cell, ...]:
@@ -65,38 +68,33 @@ def _window_cells(entry: RowScores) -> tuple[Cell, ...]:
 def _window_figures(metric: Metric, result: Result) -> Floats:
     """Return the figures (N, Q) of each window alone, without keeping what they come from."""
     counts = result.read(metric.name, "all")
-    return (
-        np.zeros((0, len(metric.columns)))
-        if counts is None
-        else metric.figures(metric.ratios(counts[:, 0].astype(np.int64)))
-    )
+    assert counts is not None  # all cells are always counted
+    return metric.figures(metric.ratios(counts[:, 0].astype(np.int64)))
 
 
 def confusion_table(entry: RowScores, name: str) -> Table:
     """Show how the target's classes are predicted: shares of each target class, pooled over windows and seeds."""
     counts = entry.totals.sum(axis=0)
     shares = divided(counts, np.broadcast_to(counts.sum(axis=1, keepdims=True), counts.shape))
-    bodies = tuple((_confusion_line(i, shares[i].tolist(), counts[i].tolist()),) for i in range(len(CLASS_NAMES)))
+    labels = [LABELS[name] for name in CLASS_NAMES]
+    lines = []
+    for target, of_target, number in zip(labels, shares.tolist(), counts.tolist(), strict=True):
+        cells = [_share_cell(*each, target) for each in zip(of_target, number, labels, strict=True)]
+        lines.append(Line(target, tuple(cells)))
     caption = f"{entry.row.name}: how each class of the target (line) is predicted (column), in percent of its cells."
-    return Table(name, caption, "Target", tuple((LABELS[c], "") for c in CLASS_NAMES), bodies)
-
-
-def _confusion_line(target: int, shares: Sequence[float], counts: Sequence[int]) -> Line:
-    label = LABELS[CLASS_NAMES[target]]
-    cells = (_share_cell(*each, label) for each in zip(shares, counts, CLASS_NAMES, strict=True))
-    return Line(label, tuple(cells))
+    return plain_table(name, caption, "Target", labels, lines)
 
 
 def _share_cell(share: float, count: int, other: str, target: str) -> Cell:
     if not np.isfinite(share):
         return Cell(ABSENT)
-    title = f"{plural(count, 'cell')}, {share:.2%} of {target}, over all windows and seeds: {LABELS[other]}"
+    title = f"{plural(count, 'cell')}, {share:.2%} of {target}, over all windows and seeds: {other}"
     return Cell(f"{100 * share:.1f}", share, title=title, tone="heat")
 
 
 def cost_table(rows: Sequence[RowScores]) -> Table:
     """Show what each row cost: parameters, training and prediction time, device."""
-    bodies = []
+    lines = []
     for entry in rows:
         records = [result.record for result in entry.row.results]
         train = [record.train_seconds for record in records if record.train_seconds is not None]
@@ -107,9 +105,9 @@ def cost_table(rows: Sequence[RowScores]) -> Table:
             _time_cell("ms a window", entry.row.window_ms, 1),
             Cell(", ".join(sorted({record.device for record in records}))),
         )
-        bodies.append((Line(entry.row.name, cells),))
-    columns = tuple((text, "") for text in ("Parameters", "Results", "Training", "Prediction", "Device"))
-    return Table("costs", "What each row cost; times are means over seeds.", "Row", columns, tuple(bodies))
+        lines.append(Line(entry.row.name, cells))
+    columns = ("Parameters", "Results", "Training", "Prediction", "Device")
+    return plain_table("costs", "What each row cost; times are means over seeds.", "Row", columns, lines)
 
 
 def _time_cell(unit: str, times: Sequence[float], digits: int) -> Cell:
@@ -123,3 +121,31 @@ def _time_cell(unit: str, times: Sequence[float], digits: int) -> Cell:
 
 def _to_baseline(kind: str) -> str:
     return f"Differences to the baseline by {kind}, resampled together. Marked where the interval excludes zero."
+
+
+def division_tables(everything: Everything, divisions: Sequence[Division]) -> dict[str, list[Table]]:
+    """Make the tables by division; one whose regions nobody knows has none."""
+    return {
+        division.name: [
+            table
+            for metric in METRICS.values()
+            if not (metric is IOU and division.name == EVERYWHERE.name)  # which has tables of its own
+            for table in _tables(metric, division, everything[metric.name][division.name])
+        ]
+        for division in divisions
+    }
+
+
+def _tables(metric: Metric, division: Division, parts: Parts) -> list[Table]:
+    columns = division.columns(metric)
+    if not columns or not parts:
+        return []
+    name = division.name if metric is IOU else f"{division.name}-{metric.name}"
+    what = f"{metric.title} {division.words}".rstrip()
+    values = f"{what}, with 95% interval. Best of each in bold."
+    differences = f"{what}: differences to the baseline, resampled together. Marked where the interval excludes zero."
+    shown = {part: value_table(name, values, scores, columns) for part, scores in parts.items()}
+    gaps = {p: difference_table(f"{name}-differences", differences, each, columns) for p, each in parts.items()}
+    alone = len(division.regions) == 1
+    tables = (next(iter(each.values())) if alone else side_by_side(each) for each in (shown, gaps))
+    return [table for table in tables if table is not None]

@@ -1,6 +1,7 @@
 """What a table on the page is made of, and how numbers are written in it."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -44,6 +45,11 @@ class Table:
     corner: str
     columns: tuple[tuple[str, str], ...]  # label and small second line
     bodies: tuple[tuple[Line, ...], ...]
+
+
+def plain_table(name: str, caption: str, corner: str, columns: Sequence[str], lines: Sequence[Line]) -> Table:
+    """Make a table whose columns have no second line and whose lines stand alone."""
+    return Table(name, caption, corner, tuple((column, "") for column in columns), tuple((line,) for line in lines))
 
 
 def number(value: float) -> str:

@@ -1,15 +1,17 @@
 """Tables of scores: rows beside each other with the best marked, and differences to their baselines."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from semgrid_eval.report.claims.paper import paper_table
-from semgrid_eval.report.estimates.bootstrap import Estimate, Parts, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores
 from semgrid_eval.report.rows.load import comparable
 from semgrid_eval.report.rows.pairing import reference_of, verdict
 from semgrid_eval.report.tables.table import (
     ABSENT,
+    MINUS,
     Cell,
     Line,
     Table,
@@ -33,13 +35,14 @@ def value_table(
     """Show the columns of every row, the best of each marked, beside the paper's values where it has them."""
     best = {column: best_rows(scores, column) for column in columns}
     bodies = tuple(_value_body(entry, best, beside_paper=beside_paper) for entry in scores.values())
-    return Table(name, caption + targets_note(scores), "Row", _headers(scores, columns), bodies)
+    several = len({entry.row.targets for entry in scores.values()}) > 1
+    return Table(name, caption + _OTHER_TARGETS * several, "Row", _headers(scores, columns), bodies)
 
 
 def difference_table(name: str, caption: str, scores: Scores, columns: Sequence[str]) -> Table | None:
     """Show each row's paired difference to its baseline; None where no row has one."""
     pairs = ((entry, reference_scores(entry, scores)) for entry in scores.values())
-    return _differences(name, caption, [(entry, other) for entry, other in pairs if other is not None], columns)
+    return _differences(name, caption, [(entry, other) for entry, other in pairs if other], columns)
 
 
 def run_differences(name: str, caption: str, scores: Scores, columns: Sequence[str]) -> Table | None:
@@ -51,18 +54,6 @@ def run_differences(name: str, caption: str, scores: Scores, columns: Sequence[s
     return _differences(name, caption, [(entry, other) for entry, other in pairs if entry is not other], columns)
 
 
-def part_values(name: str, caption: str, parts: Parts, columns: Sequence[str]) -> Table:
-    """Show the scores of all regions beside each other."""
-    return _side_by_side(name, caption, {part: value_table("", "", each, columns) for part, each in parts.items()})
-
-
-def part_differences(name: str, caption: str, parts: Parts, columns: Sequence[str]) -> Table | None:
-    """Show rows' paired differences to their baselines alike; None where no row has one."""
-    tables = {part: difference_table("", "", scores, columns) for part, scores in parts.items()}
-    found = {part: table for part, table in tables.items() if table}
-    return _side_by_side(name, caption, found) if found else None
-
-
 def reference_scores(entry: RowScores, scores: Scores) -> RowScores | None:
     """Find the scores of the baseline that a row is measured against, None where it has none on the same targets."""
     reference = reference_of(entry.row, [other.row for other in scores.values()])
@@ -71,33 +62,22 @@ def reference_scores(entry: RowScores, scores: Scores) -> RowScores | None:
 
 def best_rows(scores: Scores, column: str) -> set[str]:
     """Name the rows that are the best of those on the same targets; none is where it stands alone among others."""
-    groups: dict[str, list[str]] = {}
+    groups: dict[str, dict[str, float]] = {}
     for name, entry in scores.items():
-        groups.setdefault(entry.row.targets, []).append(name)
+        groups.setdefault(entry.row.targets, {})[name] = _worth(entry, column)
     best: set[str] = set()
-    for names in groups.values():
-        values = {name: _worth(scores[name], column) for name in names}
-        top = max((value for value in values.values() if np.isfinite(value)), default=None)
-        if len(names) > 1 or len(groups) == 1:
+    for values in groups.values():
+        top = max(filter(np.isfinite, values.values()), default=None)
+        if len(values) > 1 or len(groups) == 1:
             best |= {name for name, value in values.items() if value == top}
     return best
 
 
-def targets_note(scores: Scores) -> str:
-    """Say that not all rows can be compared, where that is so."""
-    return _OTHER_TARGETS if len({entry.row.targets for entry in scores.values()}) > 1 else ""
-
-
 def evidence(entry: RowScores, column: str) -> str:
     """Say what stands behind a number, for its tooltip."""
-    parts = [
-        f"{entry.row.name}, {column_of(entry.metric, column).label}: {number(entry.mean[column])}",
-        plural(entry.cells[column], "cell"),
-        plural(entry.windows, "window"),
-        seeds(entry),
-        interval_phrase(entry.estimate(column)),
-    ]
-    return "; ".join(parts)
+    value = f"{entry.row.name}, {column_of(entry.metric, column).label}: {number(entry.mean[column])}"
+    behind = (plural(entry.cells[column], "cell"), plural(entry.windows, "window"), seeds(entry))
+    return "; ".join((value, *behind, interval_phrase(entry.estimate(column))))
 
 
 def seeds(entry: RowScores) -> str:
@@ -107,10 +87,9 @@ def seeds(entry: RowScores) -> str:
 
 def short_count(count: int) -> str:
     """Write a count with three digits."""
-    for unit, size in (("M", 10**6), ("k", 10**4)):
-        if count >= size:
-            return f"{count / (10**6 if unit == 'M' else 10**3):.3g} {unit}"
-    return f"{count:,}"
+    if count < 10**4:
+        return f"{count:,}"
+    return f"{count / 10**6:.3g} M" if count >= 10**6 else f"{count / 10**3:.3g} k"
 
 
 def _worth(entry: RowScores, column: str) -> float:
@@ -143,14 +122,12 @@ def _paper_gap(entry: RowScores, column: str, paper: float) -> Cell:
 def _differences(
     name: str, caption: str, pairs: Sequence[tuple[RowScores, RowScores]], columns: Sequence[str]
 ) -> Table | None:
-    bodies = tuple((_difference_line(entry, other, columns),) for entry, other in pairs)
+    bodies = tuple(
+        (Line(f"{entry.row.name} {MINUS} {other.row.name}", tuple(_difference(entry, other, c) for c in columns)),)
+        for entry, other in pairs
+    )
     headers = _headers({entry.row.name: entry for entry, _ in pairs}, columns)
     return Table(name, caption, "Rows", headers, bodies) if bodies else None
-
-
-def _difference_line(entry: RowScores, other: RowScores, columns: Sequence[str]) -> Line:
-    cells = tuple(_difference(entry, other, column) for column in columns)
-    return Line(f"{entry.row.name} \N{MINUS SIGN} {other.row.name}", cells)
 
 
 def _difference(entry: RowScores, other: RowScores, column: str) -> Cell:
@@ -160,14 +137,15 @@ def _difference(entry: RowScores, other: RowScores, column: str) -> Cell:
 
 
 def _headers(scores: Scores, columns: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    first = next(iter(scores.values()), None)
-    if first is None:
-        return ()
-    return tuple((column_of(first.metric, c).label, f"{short_count(first.cells[c])} cells") for c in columns)
+    first = list(scores.values())[:1]
+    return tuple((column_of(e.metric, c).label, f"{short_count(e.cells[c])} cells") for e in first for c in columns)
 
 
-def _side_by_side(name: str, caption: str, parts: Mapping[str, Table]) -> Table:
-    """Join tables of the same columns by the headers of their lines, with dashes where one of them lacks a line."""
+def side_by_side(tables: Mapping[str, Table | None]) -> Table | None:
+    """Join regions' tables of the same columns by the headers of their lines, a dash where one of them lacks a line."""
+    parts = {part: table for part, table in tables.items() if table}
+    if not parts:
+        return None
     columns = tuple((label, f"{part}, {note}") for part, table in parts.items() for label, note in table.columns)
     lines = {part: {body[0].header: body[0].cells for body in table.bodies} for part, table in parts.items()}
     first = next(iter(parts.values()))
@@ -176,4 +154,4 @@ def _side_by_side(name: str, caption: str, parts: Mapping[str, Table]) -> Table:
         (Line(header, tuple(cell for found in lines.values() for cell in found.get(header, absent))),)
         for header in dict.fromkeys(header for found in lines.values() for header in found)
     )
-    return Table(name, caption, first.corner, columns, bodies)
+    return replace(first, columns=columns, bodies=bodies)

@@ -1,13 +1,13 @@
 """The report's files beside the page: long tables, the page's own in several formats, figures and report.json."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from semgrid_eval import __version__
 from semgrid_eval.files import write_json, write_text
 from semgrid_eval.report.claims.findings import finding_frame, finding_records
-from semgrid_eval.report.claims.scaling import scaling
+from semgrid_eval.report.claims.paper import scaling
 from semgrid_eval.report.estimates.bootstrap import LEVEL, everywhere
 from semgrid_eval.report.figures.calibration import calibration_frame
 from semgrid_eval.report.figures.settings import settings_frame
@@ -16,13 +16,17 @@ from semgrid_eval.report.figures.training import training_frame
 from semgrid_eval.report.page.material import Material
 from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
 from semgrid_eval.report.rows.load import Result, Row, Run
-from semgrid_eval.report.tables.formats.csv import frame_csv
-from semgrid_eval.report.tables.formats.table import FORMATS
+from semgrid_eval.report.tables.formats.csv import as_csv, frame_csv
+from semgrid_eval.report.tables.formats.json import as_json
+from semgrid_eval.report.tables.formats.latex import as_latex
+from semgrid_eval.report.tables.formats.markdown import as_markdown
 from semgrid_eval.report.tables.long import division_records, seed_frame, summary_frame
 from semgrid_eval.report.tables.table import Table
 
 RECORD = "report.json"
 FORMAT_VERSION = 3
+FORMATS: Mapping[str, Callable[[Table], str]] = {"csv": as_csv, "json": as_json, "md": as_markdown, "tex": as_latex}
+"""By the ends of files' names; to add a format, add a line here."""
 _UNSCORED: dict[str, Any] = {"windows": 0, "seeds": 0, "cells": {}, "scores": {}, "reference": None, "differences": {}}
 
 
@@ -50,9 +54,9 @@ def write_tables(folder: Path, tables: Sequence[Table]) -> None:
     for table in tables:
         for end, written in FORMATS.items():
             write_text(folder / "tables" / f"{table.name}.{end}", written(table))
-    for table in (table for table in tables if table.name == "categories"):
-        for end in ("md", "tex"):
-            write_text(folder / f"summary.{end}", FORMATS[end](table))
+        if table.name == "categories":
+            for end in ("md", "tex"):
+                write_text(folder / f"summary.{end}", FORMATS[end](table))
 
 
 def write_figures(folder: Path, figures: Mapping[str, Sequence[Plot]]) -> None:
@@ -66,13 +70,13 @@ def write_figures(folder: Path, figures: Mapping[str, Sequence[Plot]]) -> None:
 def report_record(material: Material, records: Mapping[str, Any]) -> dict[str, Any]:
     """Return everything a machine may want to know of a report; absent values are null."""
     runs, resampling = material.runs, material.resampling
-    scored = records.get("iou", {}).get("all", {}).get("all", {})
+    scored = records["iou"]["all"].get("all", {})
     interval = {"level": LEVEL, "draws": resampling.draws, "over": resampling.level, "why": resampling.sentence}
     return {
         "format_version": FORMAT_VERSION,
         "semgrid_eval": __version__,
         "interval": interval,
-        "runs": [_run_record(run) for run in runs],
+        "runs": [{"tag": r.tag, "scaling": scaling(r), "data": data_sets(r.record), "record": _bare(r)} for r in runs],
         "failures": [vars(failure) for failure in failures(runs)],
         "rows": {row.name: _row_facts(row) | scored.get(row.name, _UNSCORED) for run in runs for row in run.rows},
         "metrics": records,
@@ -80,13 +84,8 @@ def report_record(material: Material, records: Mapping[str, Any]) -> dict[str, A
     }
 
 
-def _run_record(run: Run) -> dict[str, Any]:
-    return {
-        "tag": run.tag,
-        "scaling": scaling(run),
-        "data": data_sets(run.record),
-        "record": run.record.model_dump(mode="json", exclude={"rows"}),
-    }
+def _bare(run: Run) -> dict[str, Any]:
+    return run.record.model_dump(mode="json", exclude={"rows"})
 
 
 def _row_facts(row: Row) -> dict[str, Any]:

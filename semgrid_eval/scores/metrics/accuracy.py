@@ -3,10 +3,10 @@
 import numpy as np
 
 from semgrid_eval.classes import UNKNOWN
-from semgrid_eval.scores.metrics.metric import Column, Counts, Floats, Regions, ScoredWindows, divided
+from semgrid_eval.scores.metrics.metric import Column, Counts, Metric, Regions, ScoredWindows
 
 
-class Accuracy:
+class Accuracy(Metric):
     """Right and all cells among those that the target knows."""
 
     name = "accuracy"
@@ -24,10 +24,6 @@ class Accuracy:
     def ratios(self, sums: Counts) -> Counts:
         """Right cells over all of them."""
         return np.stack([sums[..., 1], sums.sum(axis=-1)], axis=-1)[..., None, :]
-
-    def figures(self, ratios: Counts) -> Floats:
-        """Divide."""
-        return divided(ratios[..., 0], ratios[..., 1])
 
     def cells(self, sums: Counts) -> Counts:
         """Count the target's known cells."""

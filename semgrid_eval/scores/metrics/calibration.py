@@ -1,11 +1,11 @@
 """How far certainty can be trusted: shares of right cells by certainty, and the expected calibration error."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from semgrid_eval.classes import UNKNOWN
-from semgrid_eval.scores.metrics.metric import Column, Counts, Floats, Regions, ScoredWindows, divided
+from semgrid_eval.scores.metrics.metric import Column, Counts, Floats, Metric, Regions, ScoredWindows, divided
 
 LEVELS = 256
 """Certainties are kept as uint8, 255 = 1."""
@@ -13,28 +13,15 @@ BINS = 10
 _FULL = LEVELS - 1
 
 
-@dataclass(frozen=True)
-class Reliability:
-    """Cells in bins of certainty of equal width, from 0 to 1.
+class Reliability(NamedTuple):
+    """Cells in bins of certainty of equal width, from 0 to 1; NaN where a bin has none."""
 
-    Args:
-        certainty: (..., bins) mean certainty of the bin's cells; NaN where there is none.
-        right: (..., bins) share of the bin's cells that are right; NaN where there is none.
-        cells: (..., bins) their number.
-    """
-
-    certainty: Floats
-    right: Floats
-    cells: Counts
-
-    @property
-    def error(self) -> Floats:
-        """Mean distance between certainty and share of right cells, weighted by cells; NaN without any cell."""
-        gaps = np.nan_to_num(np.abs(self.certainty - self.right)) * self.cells
-        return divided(gaps.sum(axis=-1), self.cells.sum(axis=-1))
+    certainty: Floats  # (..., bins) mean of the bin's cells
+    right: Floats  # (..., bins) share of them that are right
+    cells: Counts  # (..., bins)
 
 
-class Calibration:
+class Calibration(Metric):
     """Cells that are predicted to be known, in bins of certainty: cells, right ones and their levels of certainty.
 
     Cells that are left unknown would drown all others. To keep those of them that the target knows would keep the
@@ -73,10 +60,16 @@ class Calibration:
         return pairs.reshape(*cells.shape[:-1], 2 * self.bins, 2)
 
     def figures(self, ratios: Counts) -> Floats:
-        """Expected calibration error, share of right cells and mean certainty."""
+        """Expected calibration error, share of right cells and mean certainty.
+
+        The error is the mean distance between certainty and share of right cells, weighted by cells.
+        """
+        bins = self.reliability(ratios)
+        gaps = np.nan_to_num(np.abs(bins.certainty - bins.right)) * bins.cells
+        error = divided(gaps.sum(axis=-1), bins.cells.sum(axis=-1))
         total = ratios.reshape(*ratios.shape[:-2], self.bins, 2, 2).sum(axis=-3)
         right, certainty = (divided(total[..., i, 0], total[..., i, 1]) for i in (0, 1))
-        return np.stack([self.reliability(ratios).error, right, certainty], axis=-1)
+        return np.stack([error, right, certainty], axis=-1)
 
     def cells(self, sums: Counts) -> Counts:
         """Count the cells of all bins."""

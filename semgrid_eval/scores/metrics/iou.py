@@ -6,21 +6,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, KNOWN_IDS, category_members
-from semgrid_eval.scores.metrics.metric import Column, Counts, Floats, Regions, ScoredWindows, divided, mean_finite
+from semgrid_eval.scores.metrics.metric import (
+    Column,
+    Counts,
+    Floats,
+    Metric,
+    Regions,
+    ScoredWindows,
+    divided,
+    mean_finite,
+)
 
 CATEGORY_COLUMNS = ("static", "static_known", "small_static", "vehicles", "small_dynamic", "mean_known")
 MERGED_COLUMNS = tuple(f"merged_{name}" for name in CATEGORY_COLUMNS if name != "mean_known")
 _CATEGORY_LABELS = ("Static", "Static (known)", "Small static", "Vehicles", "Small dynamic", "Mean (known)")
 _MERGED_LABELS = (
-    "Static (merged)",
-    "Static (known, merged)",
-    "Small static (merged)",
-    "Vehicles (merged)",
-    "Small dynamic (merged)",
+    *("Static (merged)", "Static (known, merged)", "Small static (merged)"),
+    *("Vehicles (merged)", "Small dynamic (merged)"),
 )
 
 
-class Iou:
+class Iou(Metric):
     """IoU from the cells by target and predicted class: of classes, means over a category's classes, and merged.
 
     Cityscapes merges the classes of a category before counting, but knows no class `unknown`: `merged_static_known`
@@ -46,12 +52,10 @@ class Iou:
     def ratios(self, sums: Counts) -> Counts:
         """Cells that both grids have in a class or merged category, and that either has: (..., C, C) -> (..., K, 2)."""
         target, predicted = sums.sum(axis=-1), sums.sum(axis=-2)
-        members = averaged_members()
-        groups = [(i,) for i in range(CLASS_COUNT)] + [members[name.removeprefix("merged_")] for name in MERGED_COLUMNS]
+        members, classes = averaged_members(), [(i,) for i in range(CLASS_COUNT)]
+        groups = classes + [members[name.removeprefix("merged_")] for name in MERGED_COLUMNS]
         both = np.stack([_between(sums, ids) for ids in groups], axis=-1)
-        each = np.stack(
-            [target[..., list(ids)].sum(axis=-1) + predicted[..., list(ids)].sum(axis=-1) for ids in groups], axis=-1
-        )
+        each = np.stack([(target + predicted)[..., list(ids)].sum(axis=-1) for ids in groups], axis=-1)
         return np.stack([both, each - both], axis=-1)
 
     def figures(self, ratios: Counts) -> Floats:
@@ -89,8 +93,7 @@ def confusion(target: NDArray[np.uint8], prediction: NDArray[np.uint8], mask: ND
     if max(target.max(initial=0), prediction.max(initial=0)) >= CLASS_COUNT:
         raise ValueError(f"class ids must be below {CLASS_COUNT}")
     codes = target.astype(np.int64) * CLASS_COUNT + prediction
-    counts = Regions(np.where(mask, -1, 0), 1).tally(codes, CLASS_COUNT**2)
-    return counts.reshape(len(target), CLASS_COUNT, CLASS_COUNT)
+    return Regions(np.where(mask, -1, 0), 1).tally(codes, CLASS_COUNT**2).reshape(-1, CLASS_COUNT, CLASS_COUNT)
 
 
 def class_iou(counts: Counts) -> Floats:

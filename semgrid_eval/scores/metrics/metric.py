@@ -1,6 +1,5 @@
 """What a metric is, and what it sees: scored windows whose cells are divided into regions."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -16,25 +15,15 @@ Grid = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class ScoredWindows:
-    """N windows and what a model says of them.
+    """N windows and what a model says of them."""
 
-    Args:
-        target: (N, H, W) class ids.
-        prediction: (N, H, W) class ids, the mask M treated as the row asks.
-        certainty: (N, H, W) of the prediction, 255 = 1.
-        left_out: (N, H, W) bool, cells that do not count.
-        inputs: (N, S, T, H, W) class ids, oldest first, moved into the target's place.
-        actors: (N, H, W) flags of true actors, `STANDING` and `MOVING`; None where no log holds the truth.
-        spec: extent of the grids.
-    """
-
-    target: Grid
-    prediction: Grid
-    certainty: Grid
-    left_out: NDArray[np.bool_]
-    inputs: Grid
-    actors: Grid | None
-    spec: GridSpec
+    target: Grid  # (N, H, W) class ids
+    prediction: Grid  # (N, H, W) class ids, the mask M treated as the row asks
+    certainty: Grid  # (N, H, W) of the prediction, 255 = 1
+    left_out: NDArray[np.bool_]  # (N, H, W) bool, cells that do not count
+    inputs: Grid  # (N, S, T, H, W) class ids, oldest first, moved into the target's place
+    actors: Grid | None  # (N, H, W) flags of true actors, `STANDING` and `MOVING`; None where no log holds the truth
+    spec: GridSpec  # extent of the grids
 
 
 @dataclass(frozen=True)
@@ -73,29 +62,12 @@ class Metric(Protocol):
     numerator and a denominator for each of `ratio_names`, both linear in the sums, so that they can be summed as well.
     """
 
-    @property
-    def name(self) -> str:
-        """The name in files and columns."""
-
-    @property
-    def title(self) -> str:
-        """What its figures are, in words, at the start of a sentence."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The shape of what is counted in one region of one window."""
-
-    @property
-    def ratio_names(self) -> Sequence[str]:
-        """The names of the K ratios."""
-
-    @property
-    def columns(self) -> Sequence[Column]:
-        """The Q figures."""
-
-    @property
-    def shown(self) -> Sequence[str]:
-        """The columns that a report shows where a partition asks for no others."""
+    name: str  # in files and columns
+    title: str  # what its figures are, in words, at the start of a sentence
+    shape: tuple[int, ...]  # of what is counted in one region of one window
+    ratio_names: tuple[str, ...]  # of the K ratios
+    columns: tuple[Column, ...]  # the Q figures
+    shown: tuple[str, ...]  # the columns that a report shows where a partition asks for no others
 
     def count(self, scored: ScoredWindows, regions: Regions) -> Counts:
         """Count in each window and region: -> (N, regions, *shape)."""
@@ -105,6 +77,7 @@ class Metric(Protocol):
 
     def figures(self, ratios: Counts) -> Floats:
         """Divide: (..., K, 2) -> (..., Q); NaN where there is nothing to divide by."""
+        return divided(ratios[..., 0], ratios[..., 1])
 
     def cells(self, sums: Counts) -> Counts:
         """Count the cells that stand behind each figure: (..., *shape) -> (..., Q)."""
@@ -127,6 +100,4 @@ def divided(part: NDArray[np.number], whole: Counts) -> Floats:
 
 def mean_finite(values: Floats, *, axis: int = -1) -> Floats:
     """Mean of the values along an axis that are there, NaN where none is."""
-    present = np.isfinite(values)
-    total = np.where(present, values, 0.0).sum(axis=axis)
-    return divided(total, present.sum(axis=axis))
+    return divided(np.nansum(values, axis=axis), np.isfinite(values).sum(axis=axis))

@@ -15,16 +15,12 @@ CellNumbers = Callable[[ScoredWindows], NDArray[np.int64] | None]
 class Partition:
     """Cells of windows divided into regions.
 
-    Args:
-        name: in files and columns.
-        regions: names of the regions, as a reader sees them.
-        words: which cells the regions hold, to follow "IoU"; empty where it is all of them.
-        number: numbers the region of each cell (N, H, W), -1 where it is in none; None where windows do not tell.
-        shown: what a report shows of it: columns by metric; of a metric that is not named, nothing.
+    `number` numbers the region of each cell (N, H, W), -1 where it is in none; it returns None where windows do not
+    tell. `shown` is what a report shows: columns by metric; of a metric that is not named, nothing.
     """
 
-    name: str
-    regions: Sequence[str]
-    words: str
+    name: str  # in files and columns
+    regions: Sequence[str]  # their names, as a reader sees them
+    words: str  # which cells the regions hold, to follow "IoU"; empty where it is all of them
     number: CellNumbers
     shown: Mapping[str, Sequence[str]] = field(default_factory=dict)

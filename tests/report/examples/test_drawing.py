@@ -16,12 +16,16 @@ from semgrid_eval.report.examples.drawing import (
     RIGHT_COLOURS,
     certainty_png,
     data_uri,
-    grid_png,
+    grid_picture,
     label_picture,
     right_png,
 )
 
 GRIDS = arrays(np.uint8, (5, 7), elements=st.integers(0, CLASS_COUNT - 1))
+
+
+def _png(picture):
+    return base64.b64decode(picture.uri.removeprefix("data:image/png;base64,"))
 
 
 def _colours(png):
@@ -30,7 +34,7 @@ def _colours(png):
 
 @given(GRIDS, arrays(np.bool_, (5, 7)))
 def test_each_cell_has_its_class_colour_and_the_mask_is_white(grid, mask):
-    got = _colours(grid_png(grid, mask))
+    got = _colours(_png(grid_picture("", "", grid, mask)))
     assert (got[mask] == MASK_COLOUR).all()
     np.testing.assert_array_equal(got[~mask], class_palette(safe=True)[grid[~mask]])
 
@@ -69,7 +73,6 @@ def test_certainty_is_lighter_where_it_is_higher():
 
 
 def test_a_picture_is_small_and_carried_as_a_data_uri():
-    png = grid_png(np.zeros((128, 128), np.uint8))
-    uri = data_uri(png)
+    png = _png(grid_picture("", "", np.zeros((128, 128), np.uint8)))
     assert len(png) < 500
-    assert base64.b64decode(uri.removeprefix("data:image/png;base64,")) == png
+    assert base64.b64decode(data_uri(png).removeprefix("data:image/png;base64,")) == png

@@ -48,7 +48,7 @@ def test_windows_are_read_once_for_contests_that_share_them(run, monkeypatch):
 
 def test_a_window_of_several_classes_is_shown_once(seen):
     _, groups = gallery(seen)
-    recordings = [window.recording for window in groups[1].windows]
+    recordings = [window.window.recording for window in groups[1].windows]
     assert sorted(recordings) == ["toy0", "toy1"]
 
 

@@ -6,7 +6,7 @@ import pytest
 from semgrid_eval.report.estimates.bootstrap import score_rows
 from semgrid_eval.report.figures.settings import settings_frame, settings_plots
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.rows.varied import varied_settings
+from semgrid_eval.report.rows.settings import varied_settings
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from semgrid_eval.report.estimates.bootstrap import score_all
 from semgrid_eval.report.estimates.resampling import Resampling
 from semgrid_eval.report.estimates.table import divisions
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables.divisions import division_tables
+from semgrid_eval.report.tables.scores import division_tables
 from semgrid_eval.scores.metrics.metric import Column, divided
 from semgrid_eval.scores.metrics.table import METRICS
 from semgrid_eval.scores.regions.partition import Partition

@@ -5,10 +5,10 @@ from semgrid_eval.report.estimates.bootstrap import score_all
 from semgrid_eval.report.estimates.resampling import Resampling
 from semgrid_eval.report.estimates.table import divisions
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables.long import SEED_COLUMNS, SUMMARY_COLUMNS, division_records, seed_frame, summary_frame
+from semgrid_eval.report.tables.long import SUMMARY_COLUMNS, division_records, seed_frame, summary_frame
 from semgrid_eval.scores.metrics.table import METRICS
 from semgrid_eval.scores.regions.table import PARTITIONS
-from semgrid_eval.scores.tidy import load_figures
+from semgrid_eval.scores.tidy import FIGURE_COLUMNS, load_figures
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def everything(run):
 def test_there_is_a_line_for_each_row_seed_region_and_figure(run, everything):
     """The long table says what the run itself says, without a report."""
     table = seed_frame(everything)
-    assert tuple(table.columns) == SEED_COLUMNS
+    assert tuple(table.columns) == FIGURE_COLUMNS
     keys = ["row", "seed", "metric", "division", "region", "column"]
     assert not table.duplicated(keys).any()
     theirs = load_figures(run).set_index(keys)

@@ -3,10 +3,10 @@ import pytest
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.claims.paper import paper_table
-from semgrid_eval.report.estimates.bootstrap import CATEGORY_COLUMNS, score_rows
+from semgrid_eval.report.estimates.bootstrap import score_rows
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables import scores as tables
-from semgrid_eval.scores.metrics.iou import category_iou, class_iou
+from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS, category_iou, class_iou
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,10 @@ from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables.values import (
     best_rows,
     difference_table,
-    part_differences,
-    part_values,
     reference_scores,
     run_differences,
     short_count,
+    side_by_side,
     value_table,
 )
 from semgrid_eval.scores.metrics.table import CALIBRATION, IOU
@@ -31,6 +30,14 @@ def scores(run):
 
 def near_actors(rows):
     return score_regions(rows, IOU, of_cells(ACTORS), Resampling(0))
+
+
+def value_parts(parts):
+    return {part: value_table("regions", "", scores, SHOWN) for part, scores in parts.items()}
+
+
+def difference_parts(parts):
+    return {part: difference_table("differences", "", scores, SHOWN) for part, scores in parts.items()}
 
 
 def two_rows():
@@ -123,10 +130,10 @@ def test_differences_are_paired():
 
 def test_regions_stand_side_by_side():
     parts = near_actors(two_rows())
-    notes = [note for _, note in part_values("regions", "", parts, SHOWN).columns]
+    notes = [note for _, note in side_by_side(value_parts(parts)).columns]
     assert notes[0] == "moving, 400 cells"
     assert notes[3] == "standing, 400 cells"
-    (line,) = part_differences("differences", "", parts, SHOWN).bodies[0]
+    (line,) = side_by_side(difference_parts(parts)).bodies[0]
     assert line.header == "ED-DC \N{MINUS SIGN} BL-DC"
     assert [cell.tone for cell in line.cells] == ["gain", "open", "open", "open", "open", "open"]
 
@@ -136,13 +143,13 @@ def test_a_row_that_lacks_one_region_has_dashes_there():
     sums = second.results[0].read("iou", "actors").copy()
     sums[:, 1] = 0
     second = replace(second, results=(replace(second.results[0], read=lambda *_: sums),))
-    line = part_values("", "", near_actors([first, second]), SHOWN).bodies[1][0]
+    line = side_by_side(value_parts(near_actors([first, second]))).bodies[1][0]
     assert line.cells[0].text == "0.375"
     assert [cell.text for cell in line.cells[3:]] == ["\N{EN DASH}"] * 3
 
 
 def test_without_regions_there_is_nothing_to_show():
-    assert part_differences("", "", {}, SHOWN) is None
+    assert side_by_side({}) is None
 
 
 @pytest.mark.parametrize(("count", "text"), [(999, "999"), (9999, "9,999"), (31_533, "31.5 k"), (4_586_444, "4.59 M")])

@@ -12,16 +12,9 @@ def one_line(text: str) -> str:
 
 def heads(table: Table) -> list[str]:
     """Return the headers of all columns, with the region of each where there are several."""
-    labels = [label for label, _ in table.columns]
-    several = len(set(labels)) < len(labels)
-    parts = [note.rpartition(", ")[0] for _, note in table.columns]
-    return [
-        table.corner,
-        *(
-            f"{label} ({part})" if several and part else label
-            for (label, _), part in zip(table.columns, parts, strict=True)
-        ),
-    ]
+    several = len(dict(table.columns)) < len(table.columns)
+    parts = ((label, note.rpartition(", ")[0]) for label, note in table.columns)
+    return [table.corner, *(f"{label} ({part})" if several and part else label for label, part in parts)]
 
 
 def lines(table: Table) -> Iterator[tuple[str, tuple[Cell, ...]]]:
