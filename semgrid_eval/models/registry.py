@@ -6,13 +6,7 @@ from typing import Any
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.models.model import Model
-from semgrid_eval.models.own import (
-    installed_models,
-    model_in_file,
-    model_installed,
-    version_in_file,
-    version_installed,
-)
+from semgrid_eval.models.own import installed_models, model_in_file, model_installed, version_in_file, version_installed
 
 _HERE = "semgrid_eval.models"
 MODELS = {

@@ -223,12 +223,7 @@ class Worker:
 
 
 def _keep_result(
-    folder: Path,
-    record: results.ResultRecord,
-    evaluation: Evaluation,
-    history: Path | None,
-    *,
-    with_predictions: bool,
+    folder: Path, record: results.ResultRecord, evaluation: Evaluation, history: Path | None, *, with_predictions: bool
 ) -> None:
     with atomic_folder(folder) as partial:
         results.write_sums(partial, evaluation.sums)
