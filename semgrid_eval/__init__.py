@@ -8,17 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from semgrid_eval.api import (
-        build_grids,
-        convert,
-        fit,
-        make_model,
-        make_windows,
-        open_log,
-        plot_grid,
-        run,
-        score,
-    )
+    from semgrid_eval.api import build_grids, convert, fit, make_model, make_windows, open_log, plot_grid, run, score
     from semgrid_eval.classes import CLASS_NAMES, CLASSES
     from semgrid_eval.config import Config
     from semgrid_eval.errors import SemgridError

@@ -62,6 +62,7 @@ class Executor(Protocol):
         """
 
 
+@dataclass(frozen=True)
 class InProcess:
     """Works in this process, in order."""
 

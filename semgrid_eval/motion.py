@@ -35,11 +35,6 @@ class Pose:
     y_m: float
     yaw_rad: float
 
-    @property
-    def fixed_from_vehicle(self) -> SE2:
-        """The pose as a transform."""
-        return SE2(self.x_m, self.y_m, self.yaw_rad)
-
 
 class EgoMotion:
     """Integrates speed and yaw rate; the odom frame is the vehicle frame at the first sample.

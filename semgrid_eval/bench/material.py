@@ -15,12 +15,7 @@ from semgrid_eval.models.model import Given
 from semgrid_eval.progress import silent
 from semgrid_eval.recording.types import Recording
 from semgrid_eval.sources.benchmarks import Stereo
-from semgrid_eval.sources.town.recordings import (
-    RecordingPlan,
-    SyntheticConfig,
-    plan_recordings,
-    render_recording,
-)
+from semgrid_eval.sources.town.recordings import RecordingPlan, SyntheticConfig, plan_recordings, render_recording
 from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import WindowConfig, training_windows

@@ -12,9 +12,9 @@ from torch.utils.flop_counter import FlopCounterMode
 from semgrid_eval.bench.material import GIVEN, random_windows
 from semgrid_eval.bench.measurement import Measurement, Settings, wall_s
 from semgrid_eval.bench.textbook import train_by_the_book
+from semgrid_eval.config import Config
 from semgrid_eval.models.device import Precision, choose_precision, settle_process
 from semgrid_eval.models.encoder_decoder import EncoderDecoder, EncoderDecoderSettings
-from semgrid_eval.models.model import NoSettings
 from semgrid_eval.models.network import TrainingConfig, seeded_network
 from semgrid_eval.models.newest import RepeatNewest
 from semgrid_eval.models.training import train
@@ -54,7 +54,7 @@ def measure_prediction(settings: Settings, device: torch.device) -> Iterator[Mea
         evaluate(network, windows)
         took_s = median(evaluate(network, windows).seconds for _ in range(settings.repeats))
         yield Measurement(f"predicted, f {features}", len(windows) / took_s, "windows/s")
-    newest = RepeatNewest(NoSettings(), GIVEN)
+    newest = RepeatNewest(Config(), GIVEN)
     took_s = wall_s(lambda: evaluate(newest, windows), settings.repeats)
     yield Measurement("predicted by BL-DC and scored", len(windows) / took_s, "windows/s")
 

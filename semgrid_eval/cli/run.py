@@ -117,7 +117,7 @@ def show_run(record: "RunRecord", rows: Collection[str]) -> int:
 
 
 def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -> int:
-    from semgrid_eval.runs.plan import plan_run, total_seconds
+    from semgrid_eval.runs.plan import plan_run
 
     units = plan_run(matrix, logs, out, options, stage=progress)
     click.echo("rows\tseed\twindows\tupdates\tsamples\tminutes\tstate")
@@ -126,6 +126,6 @@ def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -
         numbers = (unit.seed if unit.seed is not None else "-", unit.windows, unit.updates, unit.samples)
         click.echo("\t".join(map(str, (",".join(unit.rows), *numbers, f"{unit.seconds / 60:.1f}", state))))
     at_once = options.executor.parallel
-    minutes = total_seconds(units) / 60 / at_once
+    minutes = sum(unit.seconds for unit in units) / 60 / at_once
     say(f"About {minutes:.0f} minutes on this machine, {at_once} at a time.")
     return 1 if any(unit.failure for unit in units) else 0

@@ -89,9 +89,8 @@ def settle_process() -> None:
 
 def is_out_of_memory(error: BaseException) -> bool:
     """Tell whether an error says that something does not fit into memory; on a CPU, torch has no type for it."""
-    if isinstance(error, (torch.OutOfMemoryError, MemoryError)):
-        return True
-    return isinstance(error, RuntimeError) and "allocate memory" in str(error)
+    known = isinstance(error, (torch.OutOfMemoryError, MemoryError))
+    return known or (isinstance(error, RuntimeError) and "allocate memory" in str(error))
 
 
 @contextmanager

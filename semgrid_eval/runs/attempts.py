@@ -4,14 +4,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import NamedTuple
 
 import torch
 
 from semgrid_eval.errors import SemgridError, first_line
 from semgrid_eval.executors import NoRoomError
 from semgrid_eval.models.device import choose_device, is_out_of_memory, settle_process
-from semgrid_eval.models.registry import is_built_in
+from semgrid_eval.models.registry import MODELS
 from semgrid_eval.progress import Progress, Stage, silent, silent_stage
 from semgrid_eval.runs.data import RunData
 from semgrid_eval.runs.matrix import Matrix
@@ -19,7 +18,7 @@ from semgrid_eval.runs.options import RunOptions
 from semgrid_eval.runs.record import Outcome
 from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.units import Unit
-from semgrid_eval.runs.worker import Worker, Workplace
+from semgrid_eval.runs.worker import Worker
 
 
 def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:
@@ -37,16 +36,14 @@ def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stag
     )
     data = made(logs)
     return Worker(
-        Workplace(
-            out=out,
-            trainings=options.trainings or out / "trainings",
-            data=data,
-            scored_data=made(options.validation_logs) if options.validation_logs else data,
-            device=device,
-            threads=options.executor.threads or torch.get_num_threads(),
-            example_seed=matrix.seed,
-            stage=stage,
-        )
+        out=out,
+        trainings=options.trainings or out / "trainings",
+        training_data=data,
+        scored_data=made(options.validation_logs) if options.validation_logs else data,
+        device=device,
+        threads=options.executor.threads or torch.get_num_threads(),
+        example_seed=matrix.seed,
+        stage=stage,
     )
 
 
@@ -59,16 +56,14 @@ def unit_work(
         yield partial(_attempt, worker), silent  # the stages of a unit show themselves
         return
     # Elsewhere the same folder may be another one: paths must not depend on where a process stands.
-    place = _Place(
-        matrix.model_dump_json(),
+    there = RunOptions(
         options.device,
-        logs.resolve(),
-        out.resolve(),
         options.grids.resolve(),
-        options.validation_logs and options.validation_logs.resolve(),
-        options.trainings and options.trainings.resolve(),
-        options.executor.threads,
+        command="",
+        validation_logs=options.validation_logs and options.validation_logs.resolve(),
+        trainings=options.trainings and options.trainings.resolve(),
     )
+    place = (matrix.model_dump_json(), logs.resolve(), out.resolve(), there, options.executor.threads)
     with worker.stage("rows") as progress:
         yield partial(_attempt_elsewhere, place), progress
 
@@ -89,37 +84,21 @@ def failure_of(error: Exception, row: Row) -> str | None:
     if is_out_of_memory(error):
         return f"out of memory: {first_line(error)}"
     # What torch and its libraries raise, or code of one's own that they call.
-    if isinstance(error, RuntimeError) or not is_built_in(row.model):
+    if isinstance(error, RuntimeError) or row.model not in MODELS:
         return f"{type(error).__name__}: {first_line(error)}"
     return None
 
 
-class _Place(NamedTuple):
-    """All that another process needs to work on a run; equal places share a worker."""
-
-    matrix: str
-    device: str
-    logs: Path
-    out: Path
-    grids: Path
-    validation_logs: Path | None
-    trainings: Path | None
-    threads: int | None
-
-
-def _attempt_elsewhere(place: _Place, unit: Unit) -> Outcome:
-    return _attempt(_worker_at(place), unit)
+def _attempt_elsewhere(place: tuple[str, Path, Path, RunOptions, int | None], unit: Unit) -> Outcome:
+    return _attempt(_worker_at(*place), unit)
 
 
 @lru_cache(maxsize=1)
-def _worker_at(place: _Place) -> Worker:
+def _worker_at(matrix: str, logs: Path, out: Path, options: RunOptions, threads: int | None) -> Worker:
     """Make the worker of a process that gets units of one run; it keeps the grids between them."""
-    if place.threads is not None:
-        torch.set_num_threads(place.threads)  # torch may have been imported before its environment was set
-    options = RunOptions(
-        place.device, place.grids, command="", validation_logs=place.validation_logs, trainings=place.trainings
-    )
-    return make_worker(Matrix.model_validate_json(place.matrix), place.logs, place.out, options, silent_stage)
+    if threads is not None:
+        torch.set_num_threads(threads)  # torch may have been imported before its environment was set
+    return make_worker(Matrix.model_validate_json(matrix), logs, out, options, silent_stage)
 
 
 def _attempt(worker: Worker, unit: Unit) -> Outcome:

@@ -1,7 +1,7 @@
 """What a run would do, and about how long it would take on this machine: measured on the run's own windows."""
 
 import tempfile
-from collections.abc import Sequence
+from collections import defaultdict
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -67,11 +67,10 @@ def plan_run(
     for data in worker.data:
         data.prepare()
     units = {key: unit for key, unit in plan_units(matrix).items() if key in wanted}
-    sharing: dict[str, list[str]] = {key: [] for key in units}
+    sharing = defaultdict[str, list[str]](list)
     for row in matrix.rows:
         for key, _ in units_of(row, matrix.seed):
-            if key in sharing:
-                sharing[key].append(row.name)
+            sharing[key].append(row.name)
     speed = _Speed(worker)
     priced: set[str] = set()
     planned = []
@@ -80,11 +79,6 @@ def plan_run(
             planned.append(_plan_unit(worker, unit, tuple(sharing[key]), speed, priced))
             progress(number, len(units), unit.row.name)
     return planned
-
-
-def total_seconds(units: Sequence[PlannedUnit]) -> float:
-    """Sum the estimates."""
-    return sum(unit.seconds for unit in units)
 
 
 def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], speed: "_Speed", priced: set[str]) -> PlannedUnit:
@@ -129,9 +123,8 @@ class _Speed:
     def seconds(self, job: Job, settings: NetworkSettings, epochs_made: int) -> float:
         """Estimate the rest of a training with its validation after each epoch."""
         sample = settings.model_copy(update={"training": settings.training.model_copy(update=SAMPLE)})
-        build = digest_value(
-            [job.row.model, job.resolved.version, sample.model_dump(mode="json"), asdict(job.row.given)]
-        )
+        resolved = job.resolved
+        build = digest_value([job.row.model, resolved.version, sample.model_dump(mode="json"), asdict(job.row.given)])
         if build not in self._seconds:
             self._seconds[build] = self._measure(job, sample)
         config, watched = settings.training, job.training and job.training.watched

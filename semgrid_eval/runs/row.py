@@ -8,7 +8,8 @@ from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.model import Given, Model
-from semgrid_eval.models.registry import complete_settings, find_model, is_named, model_names
+from semgrid_eval.models.own import installed_models
+from semgrid_eval.models.registry import MODELS, complete_settings, find_model, is_named
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.results import RowFacts
 from semgrid_eval.windows.plan import WindowConfig
@@ -58,7 +59,8 @@ class Row(Config):
             if sensor not in self.grid.sensors:
                 raise ValueError(f"sensor {sensor!r} is not one of {', '.join(self.grid.sensors)}")
         if not is_named(self.model):
-            raise ValueError(f"model {self.model!r} is not one of {', '.join(model_names())} or path.py:Class")
+            names = ", ".join(dict.fromkeys([*MODELS, *installed_models()]))
+            raise ValueError(f"model {self.model!r} is not one of {names} or path.py:Class")
         if self.scored_window.inputs != self.window.inputs:
             raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
         if found := self.found_model():

@@ -59,11 +59,6 @@ class WindowSet:
     def __len__(self) -> int:
         return len(self.target_frames)
 
-    @property
-    def grids_per_window(self) -> int:
-        """How many grids a predictor sees of a window, S times T."""
-        return len(self.sensors) * self.inputs.shape[1]
-
     def to(self, device: torch.device) -> "WindowSet":
         """Return the same windows with all tensors on another device."""
         tensors = ("sensor_rows", "inputs", "target_frames", "shift_cells", "lead_s")
