@@ -9,11 +9,10 @@ from pathlib import Path
 import torch
 
 from semgrid_eval.bench import data, networks
-from semgrid_eval.bench.material import Material
 from semgrid_eval.bench.measurement import Measurement, Settings
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.runs.provenance import machine, versions
+from semgrid_eval.runs.record import machine, versions
 
 _CPU_FILE = Path("/proc/cpuinfo")
 _OF_DATA = {
@@ -42,7 +41,7 @@ def measure(
     chosen = [part for part in PARTS if part in parts]
     found: dict[str, list[Measurement]] = {}
     with tempfile.TemporaryDirectory(prefix="semgrid-bench-") as folder:
-        material = Material(Path(folder), settings)
+        material = data.Material(Path(folder), settings)
         for part in chosen:
             progress(len(found), len(chosen), part)
             measurements = _OF_DATA[part](material) if part in _OF_DATA else _OF_NETWORKS[part](settings, device)

@@ -1,7 +1,7 @@
 """What gradients train: a torch module with its loss, optimiser and schedule, and grids as planes for its layers."""
 
 from collections.abc import Iterator
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, TypeVar
 
 import torch
 from pydantic import Field, model_validator
@@ -134,7 +134,10 @@ class Network(Model, torch.nn.Module):
         return True
 
 
-def seeded_network(network: type[Network], settings: Config, given: Given, seed: int) -> Network:
+N = TypeVar("N", bound=Network)
+
+
+def seeded_network(network: type[N], settings: Config, given: Given, seed: int) -> N:
     """Make an untrained network on the CPU; the same seed gives the same weights."""
     with seeded(seed, torch.device("cpu")):
         return network(settings, given)

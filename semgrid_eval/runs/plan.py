@@ -12,21 +12,13 @@ from semgrid_eval.models.device import torch_threads
 from semgrid_eval.models.network import Network, NetworkSettings, ScheduleConfig, TrainingConfig, seeded_network
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage, silent_stage
-from semgrid_eval.runs.attempts import failure_of, make_worker
 from semgrid_eval.runs.job import Job, Training
 from semgrid_eval.runs.matrix import Matrix
-from semgrid_eval.runs.options import RunOptions
-from semgrid_eval.runs.units import Unit, plan_units, units_of, wanted_keys
+from semgrid_eval.runs.runner import failure_of, make_worker
+from semgrid_eval.runs.units import RunOptions, Unit, plan_units, units_of, wanted_keys
 from semgrid_eval.runs.worker import Worker
 
-CALIBRATION_EPOCHS = 3
-CALIBRATION_UPDATES = 4
-SAMPLE = {
-    "epochs": CALIBRATION_EPOCHS,
-    "updates_per_epoch": CALIBRATION_UPDATES,
-    "epoch_unit": "batches",
-    "schedule": ScheduleConfig(),
-}
+SAMPLE = {"epochs": 3, "updates_per_epoch": 4, "epoch_unit": "batches", "schedule": ScheduleConfig()}
 """What is measured of a training, however long it is and whatever its learning rate."""
 SCORING_SHARE = 0.4
 """Time of a forward pass against forward and backward together, as measured on CPUs; it prices validation."""
@@ -138,4 +130,4 @@ class _Speed:
             network = seeded_network(job.resolved.model, sample, job.row.given, seed=0)
             path = Path(folder) / "sample"
             trained = train(network, job.training.windows, seed=0, device=self._worker.device, folder=path)
-        return min(epoch.seconds for epoch in trained.history) / CALIBRATION_UPDATES
+        return min(epoch.seconds for epoch in trained.history) / sample.training.updates_per_epoch

@@ -41,6 +41,8 @@ WindowPlanner = Callable[[Sequence[int], WindowConfig], WindowPlan]
 class Worker:
     """Fits and scores single units; holds the grids that they share.
 
+    Its methods raise a `SemgridError` where a row cannot be run; the message says why.
+
     Args:
         out: folder of the run, and `trainings` that of the trainings.
         training_data: the grids to train on, and `scored_data` those to score on, mostly the same.
@@ -68,11 +70,7 @@ class Worker:
         return tuple(dict.fromkeys((self.training_data, self.scored_data)))
 
     def look(self, row: Row, seed: int | None) -> Job:
-        """Resolve a row with one seed into its model, its windows, its training and the id of its result.
-
-        Raises:
-            SemgridError: the row cannot be run; the message says why.
-        """
+        """Resolve a row with one seed into its model, its windows, its training and the id of its result."""
         resolved = resolve(row)
         scored, left_out = self.scored_windows(row)
         windows_id = id_of_windows(row, scored)
@@ -83,21 +81,13 @@ class Worker:
         return Job(row, seed, resolved, result_id, config, scored, windows_id, training, left_out)
 
     def scored_windows(self, row: Row) -> tuple[WindowSet, dict[str, str]]:
-        """Select the windows on which a row is scored, and say why some logs give none.
-
-        Raises:
-            SemgridError: there is no such window.
-        """
+        """Select the windows on which a row is scored, and say why some logs give none."""
         data = self.scored_data
         scored, too_short = self._select(data, row, row.validation_split, row.scored_window, validation_windows)
         return scored, {data.log_of[scored.data.recordings[index]]: why for index, why in too_short.items()}
 
     def run(self, row: Row, seed: int | None) -> Job:
-        """Make sure that the result of a row with one seed lies in the run's folder, and return what was resolved.
-
-        Raises:
-            SemgridError: the row cannot be run; the message says why.
-        """
+        """Make sure that the result of a row with one seed lies in the run's folder, and return what was resolved."""
         job = self.look(row, seed)
         self._keep_windows(job.scored, job.windows_id)
         if job.resolved.is_known and self.is_done(job):

@@ -26,10 +26,8 @@ class CameraSensor(SensorConfig):
     Args:
         camera: its name in the log; None takes a log's only one.
         image_size_px: width and height to which labels and disparity are brought before projection (reading 22).
-        top_px: first row.
-        bottom_px: end of the rows; None reaches to the edge.
-        left_px: first column.
-        right_px: end of the columns; None reaches to the edge.
+        top_px: first row, and `left_px` first column.
+        bottom_px: end of the rows, and `right_px` of the columns; None reaches to the edge.
     """
 
     kind: Literal["camera"] = "camera"

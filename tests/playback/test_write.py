@@ -20,8 +20,8 @@ from semgrid_eval.log.grids import read_exact
 from semgrid_eval.log.store import LogReader, write_log
 from semgrid_eval.playback.write import GAP_NS, write_playback
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.options import RunOptions
 from semgrid_eval.runs.runner import run_matrix
+from semgrid_eval.runs.units import RunOptions
 from semgrid_eval.scores import results
 
 YAW_RATE_RADPS = 0.3

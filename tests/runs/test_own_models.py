@@ -4,13 +4,13 @@ import importlib.metadata
 
 import pytest
 import torch
-from semgrid_eval.scores.iou import category_iou, class_iou
 from support.small_runs import run, write_logs
 
 from semgrid_eval.executors import Processes
 from semgrid_eval.models.own import ENTRY_POINT_GROUP
 from semgrid_eval.runs import worker
 from semgrid_eval.scores import results
+from semgrid_eval.scores.metrics.iou import category_iou, class_iou
 
 NETWORK = """
 import torch
@@ -92,7 +92,7 @@ def test_an_own_network_is_trained_like_a_built_in_one(logs, tmp_path, small):
 
 def test_an_own_network_ends_in_the_same_bytes_after_a_stop_and_in_other_processes(logs, tmp_path, small, monkeypatch):
     def outputs(out):
-        files = [*out.glob("results/*/counts.npz"), *out.glob("trainings/*/weights.safetensors")]
+        files = [*out.glob("results/*/sums.npz"), *out.glob("trainings/*/weights.safetensors")]
         return {str(path.relative_to(out)): path.read_bytes() for path in files}
 
     whole, stopped, elsewhere = (tmp_path / name for name in ("whole", "stopped", "elsewhere"))
@@ -161,7 +161,7 @@ def test_a_predictor_that_declares_its_weights_is_kept_and_another_is_scored_aga
     for weights in ("1", "1", "0"):
         (tmp_path / "weights.txt").write_text(weights)
         (row,) = run(rows, logs, out).rows
-        file = results.result_folder(out, row.results[0]) / "counts.npz"
+        file = results.result_folder(out, row.results[0]) / "sums.npz"
         found.append((row.results[0], file.stat().st_mtime_ns))
     assert (found[1] == found[0]) is kept
     assert found[1][0] == found[0][0]

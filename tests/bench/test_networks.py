@@ -2,8 +2,7 @@
 
 import torch
 
-from semgrid_eval.bench.material import random_windows
-from semgrid_eval.bench.textbook import prepare_window, train_by_the_book
+from semgrid_eval.bench.networks import prepare_window, random_windows, train_by_the_book
 from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
 from semgrid_eval.models.network import input_planes
 
