@@ -1,10 +1,7 @@
 """The table of models, the only place where their names stand; one's own are given as `path.py:Class` or installed."""
 
 from importlib import import_module
-from typing import Any
 
-from semgrid_eval.config import parse_config
-from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.own import installed_models, own_model, own_version
 
@@ -47,19 +44,3 @@ def version_of(name: str) -> str:
 def is_named(name: str) -> bool:
     """Tell whether a name means a model, without loading one's own code."""
     return name in MODELS or ":" in name or name in installed_models()
-
-
-def complete_settings(name: str, settings: dict[str, Any]) -> dict[str, Any]:
-    """Return a model's settings with all defaults, as they are where its code cannot be loaded.
-
-    Raises:
-        ConfigError: names the setting at fault and, for a key, the allowed ones.
-    """
-    try:
-        model = find_model(name)
-    except InputError:  # told when the model is needed
-        return settings
-    try:
-        return parse_config(model.Settings, settings).model_dump(mode="json")
-    except ConfigError as error:
-        raise ConfigError(f"settings.{error}".replace("settings.(top level)", "settings")) from None

@@ -87,7 +87,7 @@ def write_playback(
     record = read_run(run)
     scored = _read_scored(run, _row(record, row_name, run))
     chosen = _choose(scored, recording, every_recording=every_recording)
-    shifts_ns: dict[str, int] = {}
+    shifts_ns: dict[str, int] = {}  # what was added to each recording's times
     cameras: tuple[str, ...] = ()
     with atomic_file(out) as stream, MessageWriter(stream) as writer:
         end_ns = None
@@ -103,7 +103,16 @@ def write_playback(
                 cameras = cameras if backdrop is None else backdrop.cameras
             shifts_ns[name], end_ns = shift_ns, played.last_ns + shift_ns
             progress(done, len(chosen), name)
-        writer.metadata(RECORD, _metadata(record, scored, shifts_ns))
+        writer.metadata(
+            RECORD,
+            {
+                "run": record.title,
+                "row": row_name,
+                "result": scored.record.id,
+                "seed": json.dumps(scored.record.seed),
+                "shift_ns": json.dumps(shifts_ns),
+            },
+        )
     layout = out.with_suffix(".layout.json")
     write_json(layout, viewer_layout(scored.row, cameras))
     return Playback(out, layout, tuple(chosen))
@@ -226,7 +235,7 @@ class _Messages:
             return
         # Grids have the orientation of the first frame of their stretch of the log.
         first = self._backdrop.frame_at(self._windows[0].target_stamp_ns) - self._windows[0].target_frame
-        yaw_rad = self._backdrop.yaw_rad(first)
+        yaw_rad = self._backdrop.poses[first].yaw_rad
         yield from self._backdrop.messages(self.first_ns, self.last_ns, shift_ns=shift_ns, grid_yaw_rad=yaw_rad)
 
     def _grids(self, shift_ns: int) -> Iterator[Outgoing]:
@@ -261,15 +270,5 @@ class _Messages:
             raise ResultError("its result keeps no times of inputs; add the logs", field=f"row {self._scored.row.name}")
         facts = self._scored.row.facts
         last = self._backdrop.frame_at(window.target_stamp_ns) - facts.horizon_steps * facts.step_frames
-        return tuple(self._backdrop.stamp_ns(last - back * facts.step_frames) for back in reversed(range(facts.inputs)))
-
-
-def _metadata(record: RunRecord, scored: _Scored, shifts_ns: dict[str, int]) -> dict[str, str]:
-    """Say where the windows come from, and what was added to each recording's times."""
-    return {
-        "run": record.title,
-        "row": scored.row.name,
-        "result": scored.record.id,
-        "seed": json.dumps(scored.record.seed),
-        "shift_ns": json.dumps(shifts_ns),
-    }
+        frames = range(last - (facts.inputs - 1) * facts.step_frames, last + 1, facts.step_frames)
+        return tuple(self._backdrop.poses[frame].stamp_ns for frame in frames)

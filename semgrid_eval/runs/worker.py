@@ -111,7 +111,8 @@ class Worker:
         return seed in (None, self.example_seed)
 
     def _history(self, job: Job) -> Path | None:
-        return job.training.folder / TRAINING_HISTORY_FILE if job.training and job.resolved.is_network else None
+        is_network = issubclass(job.resolved.model, Network)
+        return job.training.folder / TRAINING_HISTORY_FILE if job.training and is_network else None
 
     def _select(
         self, data: RunData, row: Row, split: str, config: WindowConfig, plan: WindowPlanner
@@ -139,7 +140,7 @@ class Worker:
 
     def _training(self, resolved: Resolved, row: Row, seed: int | None, scored: WindowSet) -> Training:
         windows = self._select(self.training_data, row, row.train_split, row.window, training_windows)[0]
-        watched = self._watched(row, scored) if resolved.is_network else None
+        watched = self._watched(row, scored) if issubclass(resolved.model, Network) else None
         training_id = id_of_training(
             resolved, row, seed, self.device, threads=self.threads, windows=windows, watched=watched
         )
