@@ -210,17 +210,15 @@ class _Messages:
 
     Raises:
         LogError: the log lacks the frame of a target.
-        ResultError: the result does not tell the times of inputs, and there is no log to look them up in.
     """
 
     def __init__(self, scored: _Scored, name: str, backdrop: Backdrop | None) -> None:
         self._scored, self._backdrop = scored, backdrop
         self._indices = scored.windows_of[name]
-        windows = [scored.record.windows[i] for i in self._indices]
-        self._windows = windows
-        self._inputs_ns = [self._input_stamps_ns(window) for window in windows]
-        self.last_ns = windows[-1].target_stamp_ns
-        self.first_ns = windows[0].target_stamp_ns if backdrop is None else min(stamps[0] for stamps in self._inputs_ns)
+        self._windows = [scored.record.windows[i] for i in self._indices]
+        self.first_ns, self.last_ns = (self._windows[i].target_stamp_ns for i in (0, -1))
+        if backdrop is not None:
+            self.first_ns = min(window.input_stamps_ns[0] for window in self._windows)
 
     def messages(self, shift_ns: int) -> Iterator[Outgoing]:
         """Iterate over all messages in the order of time, all times shifted."""
@@ -239,21 +237,19 @@ class _Messages:
         yield from self._backdrop.messages(self.first_ns, self.last_ns, shift_ns=shift_ns, grid_yaw_rad=yaw_rad)
 
     def _grids(self, shift_ns: int) -> Iterator[Outgoing]:
-        for index, window, inputs_ns in zip(self._indices, self._windows, self._inputs_ns, strict=True):
-            for topic, values, layer, known_ns in self._layers(index, window, inputs_ns):
+        place, notes = self._scored.place, {"row": self._scored.row.name}
+        for index, window in zip(self._indices, self._windows, strict=True):
+            for topic, values, layer, known_ns in self._layers(index, window):
                 now_ns, publish_ns = window.target_stamp_ns + shift_ns, known_ns + shift_ns
-                place = self._scored.place
                 message = viewer_message(now_ns, values, layer, place)
-                yield Outgoing(now_ns, topic, message, publish_ns, {"row": self._scored.row.name})
+                yield Outgoing(now_ns, topic, message, publish_ns, notes)
                 if layer.names:
                     exact = exact_message(now_ns, values, layer, place)
-                    yield Outgoing(now_ns, f"{topic}/exact", exact, publish_ns, {"row": self._scored.row.name})
+                    yield Outgoing(now_ns, f"{topic}/exact", exact, publish_ns, notes)
 
-    def _layers(
-        self, index: int, window: WindowRecord, inputs_ns: Sequence[int]
-    ) -> Iterator[tuple[str, NDArray[np.uint8], GridLayer, int]]:
+    def _layers(self, index: int, window: WindowRecord) -> Iterator[tuple[str, NDArray[np.uint8], GridLayer, int]]:
         """Return topic, values (H, W), their meaning and since when they could be known, of each grid of a window."""
-        arrays, row = self._scored.arrays, self._scored.row
+        arrays, row, inputs_ns = self._scored.arrays, self._scored.row, window.input_stamps_ns
         for sensor, past in zip(row.facts.sensors, arrays["inputs"][index], strict=True):
             for back, (values, stamp_ns) in enumerate(zip(past[::-1], inputs_ns[::-1], strict=True)):
                 topic = f"{topics.GRID_INPUT}/{sensor}" + (f"/before_{back}" if back else "")
@@ -262,13 +258,3 @@ class _Messages:
         yield topics.GRID_MASK, arrays["mask"][index], MASK, window.target_stamp_ns
         yield prediction_topic(row.name), arrays["prediction"][index], CLASSES, inputs_ns[-1]
         yield topics.GRID_CERTAINTY, arrays["certainty"][index], CERTAINTY, inputs_ns[-1]
-
-    def _input_stamps_ns(self, window: WindowRecord) -> tuple[int, ...]:
-        if window.input_stamps_ns:
-            return window.input_stamps_ns
-        if self._backdrop is None:
-            raise ResultError("its result keeps no times of inputs; add the logs", field=f"row {self._scored.row.name}")
-        facts = self._scored.row.facts
-        last = self._backdrop.frame_at(window.target_stamp_ns) - facts.horizon_steps * facts.step_frames
-        frames = range(last - (facts.inputs - 1) * facts.step_frames, last + 1, facts.step_frames)
-        return tuple(self._backdrop.poses[frame].stamp_ns for frame in frames)

@@ -60,7 +60,7 @@ class WindowRecord(Config):
     log: str
     target_frame: int
     target_stamp_ns: int
-    input_stamps_ns: tuple[int, ...] = ()  # oldest first; results of older versions have none
+    input_stamps_ns: tuple[int, ...]  # oldest first
 
     @property
     def drive(self) -> str:
