@@ -123,7 +123,9 @@ def counted_row(
     """
     counts = _hit_counts(hits, cells)
     windows = tuple(
-        results.WindowRecord(recording=f"town_{i}", log=_log(f"town_{i}"), target_frame=20, target_stamp_ns=i)
+        results.WindowRecord(
+            recording=f"town_{i}", log=_log(f"town_{i}"), target_frame=20, target_stamp_ns=i, input_stamps_ns=(i,)
+        )
         for i in range(len(counts))
     )
     record = results.ResultRecord(
