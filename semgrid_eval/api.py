@@ -54,9 +54,8 @@ def convert(source: str, out: Path | str, *, workers: int = 1, **options: Any) -
     if source not in SOURCES:
         raise ConfigError(f"{source!r} is not one of {', '.join(SOURCES)}", field="source")
     found = load_source(source)
-    given = {name: str(value) if isinstance(value, Path) else value for name, value in options.items()}
     work = Work(workers, local_executor(workers))
-    return found.convert(parse_config(found.options, given, path=source), Path(out), work)
+    return found.convert(parse_config(found.options, options, path=source), Path(out), work)
 
 
 def open_log(path: Path | str) -> LogReader:

@@ -44,11 +44,7 @@ class EgoMotion:
     interval, between whose ends they are linear, and moves along the circle that they describe.
 
     Before the first sample, and after the last one that was added so far, the rates of that sample are held. So whoever
-    knows motion only up to now adds samples as they come; whoever has a whole log adds all of them first.
-
-    Args:
-        samples: motion in the order of time.
-        integrator: `euler` or `arc`.
+    knows motion only up to now adds samples as they come, in the order of time; whoever has a whole log adds all first.
     """
 
     def __init__(self, samples: Iterable[MotionSample] = (), integrator: Integrator = "euler") -> None:

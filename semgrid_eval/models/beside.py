@@ -18,9 +18,6 @@ class ModelFile:
     `sys.path` and `sys.modules` are as before whenever none of its code runs, so that the neighbours of two files may
     have the same names. What the file imports while it is loaded is all that it can import from beside it: no
     neighbour can take part in numbers that is not part of their id.
-
-    Args:
-        path: of the file.
     """
 
     def __init__(self, path: Path) -> None:

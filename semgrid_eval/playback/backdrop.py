@@ -9,7 +9,7 @@ from google.protobuf.message import Message
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import codec, topics
-from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.png import read_header
 from semgrid_eval.recording.types import Pose

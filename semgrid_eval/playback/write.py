@@ -19,7 +19,7 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import topics
 from semgrid_eval.log.codec import transforms_message
 from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, GridPlace, exact_message, viewer_message
-from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.playback.backdrop import Backdrop, Outgoing
 from semgrid_eval.playback.layout import prediction_topic, viewer_layout
@@ -176,8 +176,6 @@ def _check_shapes(
 
 def _choose(scored: _Scored, recording: str | None, *, every_recording: bool) -> list[str]:
     names = list(scored.windows_of)
-    if not names:
-        raise InputError("has no scored window", field=f"row {scored.row.name}")
     if every_recording:
         return names
     if recording is None:

@@ -14,7 +14,7 @@ from semgrid_eval.motion import EgoMotion, Integrator, Pose
 from semgrid_eval.sensors.sensor import Points, SensorConfig
 
 if TYPE_CHECKING:
-    from semgrid_eval.log.store import LogReader
+    from semgrid_eval.log.reader import LogReader
     from semgrid_eval.recording.types import CameraFrame
 
 _SIZE_PX = (16, 8192)

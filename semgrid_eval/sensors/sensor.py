@@ -11,7 +11,7 @@ from pydantic import Field
 from semgrid_eval.config import Config
 
 if TYPE_CHECKING:  # whoever reads settings alone needs no reader of logs
-    from semgrid_eval.log.store import LogReader
+    from semgrid_eval.log.reader import LogReader
 
 
 class SensorConfig(Config):
