@@ -15,7 +15,7 @@ from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.runs.job import Job, Training
 from semgrid_eval.runs.matrix import Matrix
 from semgrid_eval.runs.runner import failure_of, make_worker
-from semgrid_eval.runs.units import RunOptions, Unit, plan_units, units_of, wanted_keys
+from semgrid_eval.runs.units import RunOptions, Unit, plan_units, units_of, wanted_rows
 from semgrid_eval.runs.worker import Worker
 
 SAMPLE = {"epochs": 3, "updates_per_epoch": 4, "epoch_unit": "batches", "schedule": ScheduleConfig()}
@@ -54,11 +54,10 @@ def plan_run(
     Raises:
         InputError: there is no log at all, or the device does not exist.
     """
-    wanted = wanted_keys(matrix, options.only)
+    units = plan_units(wanted_rows(matrix, options.only), matrix.seed)
     worker = make_worker(matrix, logs, out, options, stage)
     for data in worker.data:
         data.prepare()
-    units = {key: unit for key, unit in plan_units(matrix).items() if key in wanted}
     sharing = defaultdict[str, list[str]](list)
     for row in matrix.rows:
         for key, _ in units_of(row, matrix.seed):

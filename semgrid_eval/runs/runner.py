@@ -18,7 +18,7 @@ from semgrid_eval.runs.matrix import Matrix
 from semgrid_eval.runs.record import Clock, Outcome, run_record
 from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.thumbnails import keep_pictures
-from semgrid_eval.runs.units import RunOptions, Unit, plan_units, wanted_keys, wanted_rows
+from semgrid_eval.runs.units import RunOptions, Unit, plan_units, wanted_rows
 from semgrid_eval.runs.worker import Worker
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
@@ -34,8 +34,8 @@ def run_matrix(
         ConfigError: `options.only` asks for a row that the matrix does not have.
     """
     started = Clock()
-    units = plan_units(matrix)
-    wanted = wanted_keys(matrix, options.only)
+    rows = wanted_rows(matrix, options.only)
+    units, wanted = plan_units(matrix.rows, matrix.seed), plan_units(rows, matrix.seed)
     worker = make_worker(matrix, logs, out, options, stage)
     for data in worker.data:
         data.prepare()
@@ -55,12 +55,11 @@ def run_matrix(
     look_for_others()
     keep_record()
     if options.pictures:
-        rows = wanted_rows(matrix, options.only)
         keep_pictures(out, _scored_windows(worker, rows), options.grid_executor, stage)
-    keys = [key for key in units if key in wanted]
+    keys = list(wanted)
     with _unit_work(matrix, logs, out, options, worker) as (work, progress):
         progress(0, len(keys))
-        for done, (index, outcome) in enumerate(options.executor.run(work, [units[key] for key in keys]), start=1):
+        for done, (index, outcome) in enumerate(options.executor.run(work, list(wanted.values())), start=1):
             outcomes[keys[index]] = Outcome(None, outcome.reason, {}) if isinstance(outcome, WorkerDied) else outcome
             keep_record()
             progress(done, len(keys))

@@ -1,6 +1,6 @@
 """How a matrix is run, and what it comes down to: its distinct units, each a row with one seed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -47,11 +47,11 @@ class Unit(NamedTuple):
     seed: int | None
 
 
-def plan_units(matrix: Matrix) -> dict[str, Unit]:
-    """List the distinct units of a matrix by key; rows that mean the same share them."""
+def plan_units(rows: Iterable[Row], first_seed: int) -> dict[str, Unit]:
+    """List the distinct units of rows by key; rows that mean the same share them."""
     units: dict[str, Unit] = {}
-    for row in matrix.rows:
-        for key, unit in units_of(row, matrix.seed):
+    for row in rows:
+        for key, unit in units_of(row, first_seed):
             units.setdefault(key, unit)
     return units
 
@@ -77,8 +77,3 @@ def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:
             names = ", ".join(sorted(row.name for row in matrix.rows))
             raise ConfigError(f"{pattern!r} is not a row of this matrix: {names}", field="row")
     return [row for row in matrix.rows if not only or any(row in rows for rows in found.values())]
-
-
-def wanted_keys(matrix: Matrix, only: Sequence[str]) -> set[str]:
-    """Return the keys of the units of the rows that are asked for."""
-    return {key for row in wanted_rows(matrix, only) for key, _ in units_of(row, matrix.seed)}
