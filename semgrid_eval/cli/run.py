@@ -86,17 +86,8 @@ def command(
     rows_on = chosen_executor(executor, address, jobs, gpus=gpus, shared=shared)
     # A cluster that is started here has --jobs cores, and grids are to be built on --workers.
     grids_on = local_executor(workers) if address == LOCAL else chosen_executor(executor, address, workers)
-    options = RunOptions(
-        device,
-        grids or out / "grids",
-        command_line(),
-        only,
-        rows_on,
-        grids_on,
-        pictures,
-        validation_logs,
-        trainings,
-    )
+    kept = grids or out / "grids"
+    options = RunOptions(device, kept, command_line(), only, rows_on, grids_on, pictures, validation_logs, trainings)
     if dry_run:
         return _show_plan(resolved, logs, out, options)
     record = run_matrix(resolved, logs, out, options, stage=progress)
