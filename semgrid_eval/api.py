@@ -24,8 +24,8 @@ from semgrid_eval.models.network import Network, seeded_network
 from semgrid_eval.models.registry import find_model
 from semgrid_eval.models.training import train
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.options import RunOptions
 from semgrid_eval.runs.runner import run_matrix
+from semgrid_eval.runs.units import RunOptions
 from semgrid_eval.scores.metrics.iou import confusion
 from semgrid_eval.scores.metrics.metric import column_names
 from semgrid_eval.scores.metrics.table import IOU
@@ -47,7 +47,7 @@ def convert(source: str, out: Path | str, *, workers: int = 1, **options: Any) -
     Args:
         source: `cityscapes`, `synthetic` or `town-v1`.
         out: folder of the logs.
-        workers: logs at once.
+        workers: how many logs are written at once.
         options: those of the source's command, with underscores.
 
     Raises:
@@ -57,9 +57,8 @@ def convert(source: str, out: Path | str, *, workers: int = 1, **options: Any) -
     if source not in SOURCES:
         raise ConfigError(f"{source!r} is not one of {', '.join(SOURCES)}", field="source")
     found = load_source(source)
-    given = {name: str(value) if isinstance(value, Path) else value for name, value in options.items()}
     work = Work(workers, local_executor(workers))
-    return found.convert(parse_config(found.options, given, path=source), Path(out), work)
+    return found.convert(parse_config(found.options, options, path=source), Path(out), work)
 
 
 def open_log(path: Path | str) -> LogReader:
@@ -96,13 +95,9 @@ def plot_grid(
     spec: GridSpec | None = None,
     axes: "Axes | None" = None,
 ) -> "Axes":
-    """Draw a grid (H, W) of class ids in the report's colours, in metres around the vehicle, mask M in white.
+    """Draw a grid (H, W) of class ids in the report's colours, in metres around the vehicle, mask M (H, W) in white.
 
-    Args:
-        grid: class ids.
-        mask: (H, W), drawn in white.
-        spec: extent of the grid.
-        axes: where to draw; axes of a new figure if not given.
+    It is drawn on `axes`, those of a new figure if not given.
     """
     from semgrid_eval.report.figures.grid import draw_grid  # so that matplotlib is imported only to plot
 
@@ -114,10 +109,7 @@ def score(
 ) -> dict[str, float]:
     """Score predicted class ids: grids (H, W) or (N, H, W), pooled -> IoU by class, category and merged category.
 
-    Args:
-        target: class ids.
-        prediction: class ids of the same shape.
-        mask: cells to leave out.
+    Cells of `mask`, of the same shape, are left out.
 
     Raises:
         InputError: shapes differ, or an id is not that of a class.
@@ -150,7 +142,7 @@ def make_windows(
         recordings: as `build_grids` makes them, all of one configuration.
         config: inputs, steps and horizon.
         sensors: names of the inputs' sensors; that of the target if not given.
-        spec: extent of the grids.
+        spec: extent of the grids, as they were made.
         translate: whether inputs are moved into the target's place.
 
     Raises:
@@ -227,7 +219,7 @@ def run(
     Args:
         matrix: a preset's name or a YAML file.
         logs: folder of logs.
-        out: folder of the run.
+        out: folder of the run, in which grids are kept, too.
         device: `auto`, `cpu`, `cuda`, `cuda:1` ...
         jobs: rows at once, each in a process of its own.
         only: names or patterns of rows, like `BL-*`; all if not given.

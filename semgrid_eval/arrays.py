@@ -17,18 +17,8 @@ from semgrid_eval.files import atomic_file
 _ARRAY_LIMIT_BYTES = 8 << 30
 # All that zipfile and numpy were seen to raise on damaged files.
 _DAMAGE = (
-    OSError,
-    ValueError,
-    EOFError,
-    TypeError,
-    RuntimeError,  # NotImplementedError, too: an unknown compression
-    SyntaxError,
-    MemoryError,
-    OverflowError,
-    struct.error,
-    zlib.error,
-    zipfile.BadZipFile,
-    tokenize.TokenError,
+    *(OSError, ValueError, EOFError, TypeError, RuntimeError, SyntaxError, MemoryError, OverflowError),
+    *(struct.error, zlib.error, zipfile.BadZipFile, tokenize.TokenError),
 )
 
 

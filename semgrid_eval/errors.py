@@ -8,13 +8,7 @@ class SemgridError(Exception):
 
 
 class InputError(SemgridError):
-    """A file or value given by the user cannot be used.
-
-    Args:
-        message: what is wrong, in a few words.
-        path: the file at fault.
-        field: the field in that file, or the option, at fault.
-    """
+    """A file or value given by the user cannot be used; `path` is the file, `field` the field or option at fault."""
 
     def __init__(self, message: str, *, path: Path | str | None = None, field: str | None = None) -> None:
         self.path = None if path is None else Path(path)

@@ -22,13 +22,7 @@ R = TypeVar("R")
 
 _CONTEXT = multiprocessing.get_context("spawn")  # a fork would copy whatever threads and locks the caller holds
 # Libraries read these once, when they are first imported; each worker gets its share of the cores.
-_THREAD_VARIABLES = (
-    "OMP_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-    "OPENCV_FOR_THREADS_NUM",
-)
+_LIMITS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 _GRACE_S = 5.0  # for a process to end by itself
 
 
@@ -62,6 +56,7 @@ class Executor(Protocol):
         """
 
 
+@dataclass(frozen=True)
 class InProcess:
     """Works in this process, in order."""
 
@@ -152,7 +147,7 @@ def available_cores() -> int:
 
 def thread_variables(threads: int) -> dict[str, str]:
     """Return what the environment of a new process must hold for its numeric libraries to have that many threads."""
-    return dict.fromkeys(_THREAD_VARIABLES, str(threads))
+    return dict.fromkeys(_LIMITS, str(threads))
 
 
 class _Worker:

@@ -35,11 +35,6 @@ class Pose:
     y_m: float
     yaw_rad: float
 
-    @property
-    def fixed_from_vehicle(self) -> SE2:
-        """The pose as a transform."""
-        return SE2(self.x_m, self.y_m, self.yaw_rad)
-
 
 class EgoMotion:
     """Integrates speed and yaw rate; the odom frame is the vehicle frame at the first sample.
@@ -49,11 +44,7 @@ class EgoMotion:
     interval, between whose ends they are linear, and moves along the circle that they describe.
 
     Before the first sample, and after the last one that was added so far, the rates of that sample are held. So whoever
-    knows motion only up to now adds samples as they come; whoever has a whole log adds all of them first.
-
-    Args:
-        samples: motion in the order of time.
-        integrator: `euler` or `arc`.
+    knows motion only up to now adds samples as they come, in the order of time; whoever has a whole log adds all first.
     """
 
     def __init__(self, samples: Iterable[MotionSample] = (), integrator: Integrator = "euler") -> None:

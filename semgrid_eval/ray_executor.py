@@ -39,7 +39,10 @@ class RayExecutor:
     def __init__(
         self, address: str = LOCAL, *, cpus: float = 1.0, gpus: float = 0.0, local_cpus: int | None = None
     ) -> None:
-        self._ray = _import_ray()
+        try:
+            self._ray: Any = importlib.import_module("ray")  # an extra, and untyped
+        except ImportError:
+            raise MissingExtraError("ray", "ray") from None
         self._cpus, self._gpus = cpus, gpus
         if not self._ray.is_initialized():
             self._connect(address, local_cpus)
@@ -110,10 +113,3 @@ def _check_reachable(address: str) -> None:
         socket.create_connection((host, int(port)), timeout=CONNECTION_TIMEOUT_S).close()
     except OSError as error:
         raise InputError(f"cannot be reached: {error}", field=f"ray {address}") from error
-
-
-def _import_ray() -> Any:  # noqa: ANN401 - Ray is untyped and an extra
-    try:
-        return importlib.import_module("ray")
-    except ImportError:
-        raise MissingExtraError("ray", "ray") from None

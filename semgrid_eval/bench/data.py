@@ -1,23 +1,29 @@
-"""Measures the way from a simulated town to grids: building, rendering, logs, rasterising."""
+"""Measures the way from a simulated town to grids: building, rendering, logs, rasterising.
+
+The town, a recording and a log of it are made when they are first asked for.
+"""
 
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
+from pathlib import Path
 
 import cv2
 
-from semgrid_eval.bench.material import Material
-from semgrid_eval.bench.measurement import Measurement, processor_s, wall_s
+from semgrid_eval.bench.measurement import Measurement, Settings, processor_s, wall_s
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.store import read_recording, write_log
+from semgrid_eval.progress import silent
+from semgrid_eval.recording.types import Recording
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town.drives import FRAME_COUNT
 from semgrid_eval.sources.town.kinds import KINDS
+from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
 from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
 from semgrid_eval.sources.town.town import TownSpec, prepare_town
 
@@ -29,6 +35,53 @@ _RENDERED: tuple[tuple[Stereo, int, int, float], ...] = (
 )
 """Stereo, width and height, and the promised seconds of one core for a recording."""
 _MEGABYTE = 1e6
+
+
+class Material:
+    """Inputs of the measurements.
+
+    Args:
+        folder: for towns and logs.
+        settings: how large everything is.
+    """
+
+    def __init__(self, folder: Path, settings: Settings) -> None:
+        self.folder = folder
+        self.settings = settings
+
+    def plan(self, stereo: Stereo, width_px: int, height_px: int) -> RecordingPlan:
+        """Plan a recording in the town, which is built once; the size is scaled as the settings say.
+
+        Raises:
+            InputError: SUMO failed.
+            MissingExtraError: SUMO or Embree is not installed.
+        """
+        scale = self.settings.scale
+        config = SyntheticConfig(
+            recordings=1,
+            towns=1,
+            val_share=0.0,
+            stereo=stereo,
+            width=round(width_px * scale),
+            height=round(height_px * scale),
+            town_size_m=self.settings.town_size_m,
+            duration_s=self.settings.duration_s,
+        )
+        return plan_recordings(config, self.folder / "towns", silent)[0]
+
+    @cached_property
+    def recording(self) -> Recording:
+        """A rendered recording of modelled stereo, its frames in memory."""
+        recording = render_recording(self.plan("modelled", 512, 256))
+        moments = tuple(recording.moments())
+        return replace(recording, moments=lambda: iter(moments))
+
+    @cached_property
+    def log(self) -> Path:
+        """The log of that recording."""
+        path = self.folder / "recording.mcap"
+        write_log(self.recording, path)
+        return path
 
 
 def measure_town(material: Material) -> Iterator[Measurement]:

@@ -1,24 +1,38 @@
 """Measures training, against a textbook's and against the machine's matrix rate, prediction and scoring."""
 
+import math
 import tempfile
 import time
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from statistics import median
 
+import numpy as np
 import torch
+from torch import Tensor
+from torch.nn import functional as F
 from torch.utils.flop_counter import FlopCounterMode
 
-from semgrid_eval.bench.material import GIVEN, random_windows
 from semgrid_eval.bench.measurement import Measurement, Settings, wall_s
-from semgrid_eval.bench.textbook import train_by_the_book
+from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.config import Config
+from semgrid_eval.grids.recording import GridRecording
 from semgrid_eval.models.device import Precision, choose_precision, settle_process
 from semgrid_eval.models.encoder_decoder import EncoderDecoder, EncoderDecoderSettings
-from semgrid_eval.models.model import NoSettings
-from semgrid_eval.models.network import TrainingConfig, seeded_network
+from semgrid_eval.models.model import Given
+from semgrid_eval.models.network import TrainingConfig, masked_loss, seeded_network
 from semgrid_eval.models.newest import RepeatNewest
 from semgrid_eval.models.training import train
 from semgrid_eval.scores.evaluate import evaluate
+from semgrid_eval.windows.data import WindowSet, select_windows
+from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
+
+_CELLS, _CELL_M, _FRAMES, _FRAME_NS = 128, 100 / 128, 30, 58_823_529
+_COARSE = 8  # cells of a random patch
+GIVEN = Given(("full",), WindowConfig().inputs, _CELLS, _CELLS, _CELL_M, translate=True)
+"""What a row of random windows gives its model."""
 
 
 def measure_training(settings: Settings, device: torch.device) -> Iterator[Measurement]:
@@ -54,7 +68,7 @@ def measure_prediction(settings: Settings, device: torch.device) -> Iterator[Mea
         evaluate(network, windows)
         took_s = median(evaluate(network, windows).seconds for _ in range(settings.repeats))
         yield Measurement(f"predicted, f {features}", len(windows) / took_s, "windows/s")
-    newest = RepeatNewest(NoSettings(), GIVEN)
+    newest = RepeatNewest(Config(), GIVEN)
     took_s = wall_s(lambda: evaluate(newest, windows), settings.repeats)
     yield Measurement("predicted by BL-DC and scored", len(windows) / took_s, "windows/s")
 
@@ -104,3 +118,81 @@ def _flops_of_an_update(config: EncoderDecoderSettings, batch: int) -> float:
     with FlopCounterMode(display=False) as counter:
         network.loss(network(part), part).backward()  # type: ignore[no-untyped-call]
     return float(counter.get_total_flops()) * batch
+
+
+def train_by_the_book(
+    config: EncoderDecoderSettings, windows: WindowSet, *, batch: int, updates: int, epochs: int, device: torch.device
+) -> list[float]:
+    """Train as a textbook has it and return the seconds of each epoch of `updates` batches.
+
+    Network, loss and optimiser are ours; windows are prepared one by one, in float32, default memory layout and
+    default allocator.
+    """
+    network = seeded_network(EncoderDecoder, config, GIVEN, seed=0)
+    network.to(device=device, memory_format=torch.contiguous_format)  # type: ignore[call-overload]
+    optimizer = torch.optim.RMSprop(network.parameters(), lr=1e-3, alpha=0.9, eps=1e-7)
+    generator = torch.Generator().manual_seed(0)
+    seconds = []
+    for _ in range(epochs):
+        start_s = time.perf_counter()
+        for _ in range(updates):
+            chosen = torch.randint(len(windows), (batch,), generator=generator).tolist()
+            samples = [prepare_window(windows, index) for index in chosen]
+            planes, target, mask = (torch.stack(column).to(device) for column in zip(*samples, strict=True))
+            loss = masked_loss(network.from_planes(planes), target, mask)
+            optimizer.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            optimizer.step()
+        loss.item()  # waits for the device
+        seconds.append(time.perf_counter() - start_s)
+    return seconds
+
+
+def prepare_window(windows: WindowSet, index: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Prepare one window of one sensor: one-hot inputs (T * C, H, W), target (H, W) uint8 and mask M (H, W) bool."""
+    target = windows.data.grids[0, windows.target_frames[index]]
+    aligned = [
+        shift(windows.data.grids[0, frame], *windows.shift_cells[index, t].tolist())
+        for t, frame in enumerate(windows.inputs[index].tolist())
+    ]
+    planes = torch.cat([F.one_hot(grid.long(), CLASS_COUNT).permute(2, 0, 1).float() for grid in aligned])
+    return planes.contiguous(), target, (torch.stack(aligned) != 0).any(dim=0) & (target == 0)
+
+
+def shift(grid: Tensor, rows: int, columns: int) -> Tensor:
+    """Move a grid (H, W) by cells with unknown where content enters."""
+    moved = torch.zeros_like(grid)
+    height, width = grid.shape
+    to_rows, to_columns = slice(max(rows, 0), height + min(rows, 0)), slice(max(columns, 0), width + min(columns, 0))
+    from_rows = slice(max(-rows, 0), height + min(-rows, 0))
+    from_columns = slice(max(-columns, 0), width + min(-columns, 0))
+    moved[to_rows, to_columns] = grid[from_rows, from_columns]
+    return moved
+
+
+@cache
+def random_windows(count: int = 80) -> WindowSet:
+    """Make windows over random coarse grids; how long a network takes does not depend on what they show."""
+    random = np.random.default_rng(0)
+    config = WindowConfig()
+    recordings = math.ceil(count / (_FRAMES - config.reach_frames))
+    data = stack_recordings([_random_recording(str(number), random) for number in range(recordings)], cell_m=_CELL_M)
+    return select_windows(data, training_windows(data.frame_counts, config).windows[:count], sensors=["full"])
+
+
+def _random_recording(name: str, random: np.random.Generator) -> GridRecording:
+    size = _CELLS // _COARSE
+    coarse = random.integers(0, CLASS_COUNT, (1, _FRAMES, size, size), dtype=np.uint8)
+    return GridRecording(
+        name=name,
+        log="",
+        digest=name,
+        split="train",
+        dataset="random",
+        sensors=("full",),
+        target="full",
+        stamps_ns=np.arange(_FRAMES, dtype=np.int64) * _FRAME_NS,
+        grids=coarse.repeat(_COARSE, axis=2).repeat(_COARSE, axis=3),
+        position_m=np.cumsum(random.normal(0.3, 0.1, (_FRAMES, 2)), axis=0),
+        yaw_rad=np.zeros(_FRAMES),
+    )

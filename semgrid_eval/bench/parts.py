@@ -9,13 +9,12 @@ from pathlib import Path
 import torch
 
 from semgrid_eval.bench import data, networks
-from semgrid_eval.bench.material import Material
 from semgrid_eval.bench.measurement import Measurement, Settings
 from semgrid_eval.errors import ConfigError
+from semgrid_eval.models.device import cpu_facts
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.runs.provenance import machine, versions
+from semgrid_eval.runs.record import machine, versions
 
-_CPU_FILE = Path("/proc/cpuinfo")
 _OF_DATA = {
     "town": data.measure_town,
     "render": data.measure_rendering,
@@ -42,7 +41,7 @@ def measure(
     chosen = [part for part in PARTS if part in parts]
     found: dict[str, list[Measurement]] = {}
     with tempfile.TemporaryDirectory(prefix="semgrid-bench-") as folder:
-        material = Material(Path(folder), settings)
+        material = data.Material(Path(folder), settings)
         for part in chosen:
             progress(len(found), len(chosen), part)
             measurements = _OF_DATA[part](material) if part in _OF_DATA else _OF_NETWORKS[part](settings, device)
@@ -54,7 +53,7 @@ def measure(
 def conditions(device: torch.device) -> dict[str, str]:
     """Return what the numbers hold for: processor, cores, threads, device, other work at this moment and versions."""
     return {
-        "processor": _processor(),
+        "processor": cpu_facts().get("model name") or platform.processor() or platform.machine(),
         "load": f"{load():.1f}",
         **machine(device, torch.get_num_threads()),
         **versions(),
@@ -64,13 +63,3 @@ def conditions(device: torch.device) -> dict[str, str]:
 def load() -> float:
     """Return how many processes wanted to run during the last minute; 0 where the system does not say."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
-
-
-def _processor() -> str:
-    """Return the name of the processor's model."""
-    try:
-        lines = _CPU_FILE.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        lines = []
-    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(names, platform.processor() or platform.machine())

@@ -13,7 +13,7 @@ from semgrid_eval.ray_executor import LOCAL
 
 if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.runs.matrix import Matrix
-    from semgrid_eval.runs.options import RunOptions
+    from semgrid_eval.runs.units import RunOptions
     from semgrid_eval.scores.results import RunRecord
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -73,18 +73,16 @@ def command(
     """
     from semgrid_eval.models.device import visible_gpus
     from semgrid_eval.runs.matrix import load_matrix
-    from semgrid_eval.runs.options import RunOptions
     from semgrid_eval.runs.runner import run_matrix
-    from semgrid_eval.runs.units import wanted_rows
+    from semgrid_eval.runs.units import RunOptions, wanted_rows
 
     resolved = load_matrix(matrix, models=models)
     shared = visible_gpus() if device in ("auto", "cuda") else ()
     rows_on = chosen_executor(executor, address, jobs, gpus=gpus, shared=shared)
     # A cluster that is started here has --jobs cores, and grids are to be built on --workers.
     grids_on = local_executor(workers) if address == LOCAL else chosen_executor(executor, address, workers)
-    options = RunOptions(
-        device, grids or out / "grids", command_line(), only, rows_on, grids_on, pictures, validation_logs, trainings
-    )
+    kept = grids or out / "grids"
+    options = RunOptions(device, kept, command_line(), only, rows_on, grids_on, pictures, validation_logs, trainings)
     if dry_run:
         return _show_plan(resolved, logs, out, options)
     record = run_matrix(resolved, logs, out, options, stage=progress)
@@ -104,7 +102,7 @@ def show_run(record: "RunRecord", rows: Collection[str]) -> int:
 
 
 def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -> int:
-    from semgrid_eval.runs.plan import plan_run, total_seconds
+    from semgrid_eval.runs.plan import plan_run
 
     units = plan_run(matrix, logs, out, options, stage=progress)
     click.echo("rows\tseed\twindows\tupdates\tsamples\tminutes\tstate")
@@ -113,6 +111,6 @@ def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -
         numbers = (unit.seed if unit.seed is not None else "-", unit.windows, unit.updates, unit.samples)
         click.echo("\t".join(map(str, (",".join(unit.rows), *numbers, f"{unit.seconds / 60:.1f}", state))))
     at_once = options.executor.parallel
-    minutes = total_seconds(units) / 60 / at_once
+    minutes = sum(unit.seconds for unit in units) / 60 / at_once
     say(f"About {minutes:.0f} minutes on this machine, {at_once} at a time.")
     return 1 if any(unit.failure for unit in units) else 0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from semgrid_eval.errors import LogError
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.spec import MOVING, STANDING, GridSpec
-from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import TRUE_ACTORS
 from semgrid_eval.recording.types import Actor, Pose
 
@@ -34,11 +34,10 @@ class TrueActors:
         self._moment = next(self._moments, None)
 
     def flags(self, stamps_ns: NDArray[np.int64], yaw_rad: Floats) -> Flags | None:
-        """Draw the footprints at (F,) times, later ones than at the last call: -> (F, H, W), None without the truth.
+        """Draw the footprints at (F,) times, later ones than at the last call: -> (F, H, W).
 
-        Args:
-            stamps_ns: times of a stretch of frames; the truth must be known at each of them.
-            yaw_rad: (F,) heading of the vehicle in the orientation of the grid, as grids are turned by.
+        None where the truth is not known at each of them. `yaw_rad` (F,) is the heading of the vehicle in the
+        orientation of the grid.
 
         Raises:
             LogError: the truth is damaged or not finite.
@@ -63,12 +62,8 @@ class TrueActors:
 def boxes_in_grid(actors: Sequence[Actor], pose: Pose, yaw_rad: float) -> Floats:
     """Bring actors into a grid's orientation: -> (A, 6) forward and left of the vehicle, yaw, length, width, speed.
 
-    The vehicle itself, should it be among the actors, is left out: only its own footprint covers its origin.
-
-    Args:
-        actors: in the map frame.
-        pose: of the vehicle in the map frame.
-        yaw_rad: heading of the vehicle in the orientation of the grid.
+    Actors and `pose` are in the map frame; `yaw_rad` is the heading of the vehicle in the orientation of the grid. The
+    vehicle itself, should it be among the actors, is left out: only its own footprint covers its origin.
     """
     if not actors:
         return np.zeros((0, 6))

@@ -16,7 +16,7 @@ from semgrid_eval.grids.actors import TrueActors
 from semgrid_eval.grids.rasterise import Cells, add_points, no_points, rasterise
 from semgrid_eval.grids.recording import FORMAT_VERSION, GridRecording, read_recordings, write_recordings
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.motion import EgoMotion
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.sensors.kinds import read_points

@@ -1,7 +1,6 @@
 """Discretisation D: labelled points to cells by priority, and class-wise morphology (readings 12 and 13)."""
 
 import math
-from typing import Literal
 
 import cv2
 import numba
@@ -10,12 +9,11 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASSES, NO_POINT, UNKNOWN, Category, priorities
 from semgrid_eval.geometry import SE2
-from semgrid_eval.grids.spec import GridSpec
+from semgrid_eval.grids.spec import GridSpec, Morphology
 from semgrid_eval.sensors.sensor import Points
 
 Cells = NDArray[np.uint8]
 Counts = NDArray[np.int32]
-Morphology = Literal["minkowski", "opencv", "off"]
 
 STATIC_KERNELS_CELLS = (3, 2, 4, 4)
 OTHER_KERNELS_CELLS = (1, 1, 2, 2)
@@ -36,12 +34,8 @@ def no_points(spec: GridSpec) -> Counts:
 def add_points(counts: Counts, points: Points, grid_from_points: SE2, spec: GridSpec) -> None:
     """Move points into the grid (T1) and add them to the counts (C, rows, columns) of their classes and cells.
 
-    Args:
-        counts: of points by class and cell.
-        points: of one sensor.
-        grid_from_points: from the vehicle frame at the points' time to the grid's axes around the vehicle: the turn by
-            its heading, and the way driven since.
-        spec: extent of the grid.
+    `grid_from_points` is from the vehicle frame at the points' time to the grid's axes around the vehicle: the turn by
+    its heading, and the way driven since.
     """
     move = grid_from_points
     _count(

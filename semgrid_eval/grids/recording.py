@@ -21,8 +21,7 @@ class GridRecording:
 
     Args:
         name: of the recording; the stretches of a longer log are told apart by `#1`, `#2`, ...
-        log: path of its log.
-        digest: of the log.
+        log: path of its log, and `digest` that of its bytes.
         split: `train`, `val` or `test`.
         dataset: where it comes from.
         sensors: names, in the order of `grids`; a target of several sensors is one of them.

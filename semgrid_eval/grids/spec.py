@@ -13,6 +13,7 @@ from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sensors.kinds import Sensor, SensorName
 from semgrid_eval.sensors.sensor import SensorConfig
 
+Morphology = Literal["minkowski", "opencv", "off"]
 STANDING, MOVING = 1, 2
 """Bits of the flags that say whose footprint a cell lies in."""
 
@@ -72,7 +73,7 @@ class GridConfig(Config):
     sensors: dict[SensorName, Sensor] = Field(default_factory=paper_sensors)
     target: tuple[str, ...] = Field(("full",), min_length=1)
     integrator: Integrator = "euler"
-    morphology: Literal["minkowski", "opencv", "off"] = "minkowski"
+    morphology: Morphology = "minkowski"
     stretch_frames: int = Field(30, ge=2, le=100_000)
     class_map: dict[str, str | None] = Field(default_factory=dict)
 

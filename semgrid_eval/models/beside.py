@@ -18,9 +18,6 @@ class ModelFile:
     `sys.path` and `sys.modules` are as before whenever none of its code runs, so that the neighbours of two files may
     have the same names. What the file imports while it is loaded is all that it can import from beside it: no
     neighbour can take part in numbers that is not part of their id.
-
-    Args:
-        path: of the file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -42,6 +39,10 @@ class ModelFile:
         if not self._path.is_file() or spec is None or spec.loader is None:
             raise InputError("is not a Python file; a model is given as path.py:Class", path=self._path)
         module = importlib.util.module_from_spec(spec)
+        # What the caller has imported from beside the file is imported again, so that it is known as a source.
+        others = {each for each in sys.modules if not each.startswith(("semgrid_eval", "__main__"))}
+        tops = {top for top in {each.partition(".")[0] for each in others} if self._is_beside(top)}
+        callers = {each: sys.modules.pop(each) for each in others if each.partition(".")[0] in tops}
         sys.modules[name] = module
         before = set(sys.modules)
         importlib.invalidate_caches()
@@ -57,6 +58,7 @@ class ModelFile:
             sys.dont_write_bytecode = writes_bytecode
             sys.path.remove(str(self.folder))
             self._take_neighbours(before)
+            sys.modules.update(callers)
         self._digest = digest_files(self.sources())
         return module
 

@@ -38,8 +38,7 @@ class TrainingFolder:
     """The folder of one training, which `key` tells from every other."""
 
     def __init__(self, path: Path, key: str) -> None:
-        self._path = path
-        self._key = key
+        self._path, self._key, self._checkpoint = path, key, path / CHECKPOINT_FILE
 
     def is_complete(self) -> bool:
         """Tell whether the training was finished.
@@ -84,11 +83,7 @@ class TrainingFolder:
             ) from error
 
     def keep(self, network: Network, optimizer: torch.optim.Optimizer, history: Sequence[EpochRecord]) -> None:
-        """Write the checkpoint, then the history: a stop loses nothing that was kept before.
-
-        Raises:
-            InputError: the folder cannot be written to.
-        """
+        """Write the checkpoint, then the history: a stop loses nothing that was kept before."""
         state = {
             "key": self._key,
             "network": network.state_dict(),
@@ -100,18 +95,10 @@ class TrainingFolder:
         write_history(self._path / HISTORY_FILE, history)
 
     def finish(self, network: Network, history: Sequence[EpochRecord]) -> None:
-        """Write history and weights and remove the checkpoint.
-
-        Raises:
-            InputError: the folder cannot be written to.
-        """
+        """Write history and weights and remove the checkpoint."""
         write_history(self._path / HISTORY_FILE, history)
         save_weights(network, self._path / WEIGHTS_FILE, training=self._key)
         self._checkpoint.unlink(missing_ok=True)
-
-    @property
-    def _checkpoint(self) -> Path:
-        return self._path / CHECKPOINT_FILE
 
     def _check_key(self, found: object, path: Path) -> None:
         if found != self._key:
@@ -180,17 +167,17 @@ def read_history(path: Path) -> list[EpochRecord]:
     """
     try:
         with path.open(encoding="utf-8", newline="") as stream:
-            return [_record(row) for row in csv.DictReader(stream)]
+            rows = list(csv.DictReader(stream))
+        return [
+            EpochRecord(
+                epoch=int(row["epoch"]),
+                updates=int(row["updates"]),
+                learning_rate=float(row["learning_rate"]),
+                loss=float(row["loss"]),
+                validation_loss=float(row["validation_loss"]) if row["validation_loss"] else None,
+                seconds=float(row["seconds"]),
+            )
+            for row in rows
+        ]
     except (OSError, ValueError, KeyError, TypeError, csv.Error) as error:
         raise InputError(f"is not a history of a training: {error}", path=path) from error
-
-
-def _record(row: dict[str, str]) -> EpochRecord:
-    return EpochRecord(
-        epoch=int(row["epoch"]),
-        updates=int(row["updates"]),
-        learning_rate=float(row["learning_rate"]),
-        loss=float(row["loss"]),
-        validation_loss=float(row["validation_loss"]) if row["validation_loss"] else None,
-        seconds=float(row["seconds"]),
-    )

@@ -15,7 +15,7 @@ from semgrid_eval.errors import ConfigError
 Precision = Literal["auto", "float32", "bf16"]
 
 _DEVICE_TYPES = ("cpu", "cuda", "mps")
-_CPU_FLAGS = Path("/proc/cpuinfo")
+_CPU_FILE = Path("/proc/cpuinfo")
 _BF16_CAPABILITY = (8, 0)
 _BF16_FLAGS = {"avx512_bf16", "amx_bf16"}
 # Parameters of glibc's mallopt and values that make it keep and re-use its memory.
@@ -61,14 +61,19 @@ def visible_gpus() -> list[str]:
 
 
 @cache
+def cpu_facts() -> dict[str, str]:
+    """Read what the system says of its first processor, like `model name` and `flags`; empty where it does not."""
+    try:
+        text = _CPU_FILE.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return {}
+    pairs = (line.partition(":") for line in text.partition("\n\n")[0].splitlines())
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
 def cpu_has_bf16() -> bool:
     """Tell whether this CPU multiplies bfloat16 natively; False where the system does not say."""
-    try:
-        text = _CPU_FLAGS.read_text(encoding="ascii", errors="ignore")
-    except OSError:
-        return False
-    flags = next((line for line in text.splitlines() if line.startswith("flags")), "")
-    return not _BF16_FLAGS.isdisjoint(flags.split())
+    return not _BF16_FLAGS.isdisjoint(cpu_facts().get("flags", "").split())
 
 
 def settle_process() -> None:
@@ -89,9 +94,8 @@ def settle_process() -> None:
 
 def is_out_of_memory(error: BaseException) -> bool:
     """Tell whether an error says that something does not fit into memory; on a CPU, torch has no type for it."""
-    if isinstance(error, (torch.OutOfMemoryError, MemoryError)):
-        return True
-    return isinstance(error, RuntimeError) and "allocate memory" in str(error)
+    known = isinstance(error, (torch.OutOfMemoryError, MemoryError))
+    return known or (isinstance(error, RuntimeError) and "allocate memory" in str(error))
 
 
 @contextmanager

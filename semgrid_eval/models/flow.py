@@ -103,11 +103,7 @@ class MoveOn(Baseline):
 def find_moves(older: Grid, newer: Grid, cells_per_mps: float, config: FlowSettings) -> list[Move]:
     """Match components of two aligned grids (H, W) that show motion, each of them once.
 
-    Args:
-        older: the grid before the newest.
-        newer: the newest grid.
-        cells_per_mps: how many cells a speed of 1 m/s makes between them.
-        config: what counts as evidence.
+    `cells_per_mps` is how many cells a speed of 1 m/s makes between them.
     """
     moves: list[Move] = []
     for class_id in MOVABLE:

@@ -41,10 +41,6 @@ class Given:
         return self.grids * CLASS_COUNT
 
 
-class NoSettings(Config):
-    """Settings of a model that has none."""
-
-
 class Model:
     """Base of all models: subclass it, answer in `predict`, and in `fit` learn from training windows.
 
@@ -55,7 +51,7 @@ class Model:
         given: what the row gives it.
     """
 
-    Settings: ClassVar[type[Config]] = NoSettings
+    Settings: ClassVar[type[Config]] = Config
     """Strict configuration class of what a row may set under `settings`."""
     words: ClassVar[str] = ""
     """What it does, for labels; the name of the class, where it does not say."""
@@ -120,6 +116,4 @@ def one_hot(classes: Tensor) -> Tensor:
 
 def parameter_count(model: Model) -> int | None:
     """Count the trained values of a torch module, None of anything else."""
-    if not isinstance(model, torch.nn.Module):
-        return None
-    return sum(parameter.numel() for parameter in model.parameters())
+    return sum(each.numel() for each in model.parameters()) if isinstance(model, torch.nn.Module) else None

@@ -1,7 +1,7 @@
 """What gradients train: a torch module with its loss, optimiser and schedule, and grids as planes for its layers."""
 
 from collections.abc import Iterator
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, TypeVar
 
 import torch
 from pydantic import Field, model_validator
@@ -134,12 +134,10 @@ class Network(Model, torch.nn.Module):
         return True
 
 
-def seeded_network(
-    network: type[Network],
-    settings: Any,  # noqa: ANN401 - of the network's class `Settings`
-    given: Given,
-    seed: int,
-) -> Network:
+N = TypeVar("N", bound=Network)
+
+
+def seeded_network(network: type[N], settings: Config, given: Given, seed: int) -> N:
     """Make an untrained network on the CPU; the same seed gives the same weights."""
     with seeded(seed, torch.device("cpu")):
         return network(settings, given)
@@ -155,18 +153,16 @@ def masked_loss(logits: Tensor, target: Tensor, mask: Tensor) -> Tensor:
     return F.cross_entropy(logits.float(), counted, ignore_index=_IGNORED, reduction="sum") / target.numel()
 
 
-def one_hot_planes(grids: Tensor, dtype: torch.dtype) -> Tensor:
-    """Spread class ids over channels: (B, K, H, W) uint8 -> (B, K * C, H, W) in channels-last memory."""
-    ids = torch.arange(CLASS_COUNT, dtype=torch.uint8, device=grids.device)
-    planes = grids.permute(0, 2, 3, 1).unsqueeze(-1) == ids  # (B, H, W, K, C)
-    return planes.flatten(3).to(dtype).permute(0, 3, 1, 2)
-
-
 def input_planes(past: Tensor) -> Tensor:
-    """Spread all inputs over channels: (B, S, T, H, W) uint8 -> (B, S * T * C, H, W), in what layers compute in."""
+    """Spread all inputs over channels: (B, S, T, H, W) uint8 -> (B, S * T * C, H, W) in channels-last memory.
+
+    The planes have the type that layers compute in.
+    """
     device = past.device.type
     dtype = torch.get_autocast_dtype(device) if torch.is_autocast_enabled(device) else torch.float32
-    return one_hot_planes(past.flatten(1, 2), dtype)
+    ids = torch.arange(CLASS_COUNT, dtype=torch.uint8, device=past.device)
+    planes = past.flatten(1, 2).permute(0, 2, 3, 1).unsqueeze(-1) == ids  # (B, H, W, S * T, C)
+    return planes.flatten(3).to(dtype).permute(0, 3, 1, 2)
 
 
 def autocast(device: torch.device, dtype: torch.dtype) -> torch.autocast:

@@ -25,44 +25,31 @@ ENTRY_POINT_GROUP = "semgrid_eval.models"
 _loaded: dict[str, tuple[ModelFile, type[Model]]] = {}
 
 
-def model_in_file(spec: str) -> type[Model]:
-    """Load the model that `path.py:Class` stands for; its file is run once, and again when it has changed.
+def own_model(name: str) -> type[Model]:
+    """Load the model of `path.py:Class`, whose file is run once and again when it has changed, or of an entry point.
 
     Raises:
-        InputError: there is no such file or class, or running it failed.
+        InputError: there is no such file, class or entry point, or loading it failed.
     """
-    return _from_file(spec)[1]
-
-
-def model_installed(name: str) -> type[Model]:
-    """Load the model that a package has registered.
-
-    Raises:
-        InputError: there is no such entry point, or loading it failed.
-    """
+    if ":" in name:
+        return _from_file(name)[1]
     with _one_line(name):
         cls = _entry_point(name).load()
     return _guarded(cls, name, None)
 
 
-def version_in_file(spec: str) -> str:
-    """Digest a model's file, what it imports from beside it, and the `files` that it declares.
+def own_version(name: str) -> str:
+    """Digest what makes a model: its file and what it imports from beside it, and the `files` that it declares.
+
+    Of an installed model it is the version of its package, the module of its class, and the `files`.
 
     Raises:
         InputError: it cannot be loaded, or lacks a declared file.
     """
-    file, cls = _from_file(spec)
-    return digest_files([*file.sources(), *_declared(cls, file.folder, spec)])
-
-
-def version_installed(name: str) -> str:
-    """Digest an installed model's package, its version, the module of its class, and the `files` that it declares.
-
-    Raises:
-        InputError: it cannot be loaded, or lacks a declared file.
-    """
-    cls = model_installed(name)
-    module = Path(str(sys.modules[_entry_point(name).module].__file__))
+    if ":" in name:
+        file, cls = _from_file(name)
+        return digest_files([*file.sources(), *_declared(cls, file.folder, name)])
+    cls, module = own_model(name), Path(str(sys.modules[_entry_point(name).module].__file__))
     return digest_value([installed_models()[name], digest_files([module, *_declared(cls, module.parent, name)])])
 
 
@@ -108,7 +95,10 @@ class _Guarded(Model):
 
     def predict(self, batch: WindowBatch) -> Tensor:
         with self._guard():
-            return self._checked(super().predict(batch), batch)
+            scores = self._checked(super().predict(batch), batch)
+            if not bool(torch.isfinite(scores).all()):
+                raise InputError("gave scores that are NaN or infinite", field=self._own_name)
+            return scores
 
     @classmethod
     def in_words(cls, settings: Any) -> str:  # noqa: ANN401 - of the class `Settings`
@@ -127,8 +117,7 @@ class _Guarded(Model):
             yield
 
     def _checked(self, scores: Tensor, batch: WindowBatch) -> Tensor:
-        fault = _fault(scores, batch)
-        if fault:
+        if fault := _fault(scores, batch):
             raise InputError(fault, field=self._own_name)
         return scores
 
@@ -140,11 +129,8 @@ class _GuardedNetwork(_Guarded, Network):
         # Windows in their order are views of what other rows see.
         own = replace(batch, shift_cells=batch.shift_cells.clone(), lead_s=batch.lead_s.clone())
         with self._guard():
-            logits = super().forward(own)
-        fault = _shape_fault(logits, batch)  # what is no number ends a training by its loss, which says more
-        if fault:
-            raise InputError(fault, field=self._own_name)
-        return logits
+            # What is no number ends a training by its loss, which says more.
+            return self._checked(super().forward(own), batch)
 
     def loss(self, logits: Tensor, batch: WindowBatch) -> Tensor:
         with self._guard():
@@ -193,14 +179,7 @@ def _one_line(name: str) -> Iterator[None]:
 
 
 def _fault(scores: object, batch: WindowBatch) -> str | None:
-    """Say in one line what is wrong with an answer, None where nothing is."""
-    fault = _shape_fault(scores, batch)
-    if fault is None and isinstance(scores, Tensor) and not bool(torch.isfinite(scores).all()):
-        return "gave scores that are NaN or infinite"
-    return fault
-
-
-def _shape_fault(scores: object, batch: WindowBatch) -> str | None:
+    """Say in one line what is wrong with an answer's type or shape, None where nothing is."""
     if not isinstance(scores, Tensor):
         return f"gave a {type(scores).__name__} where a tensor is needed"
     count, rows, columns = batch.target.shape

@@ -1,12 +1,9 @@
 """The table of models, the only place where their names stand; one's own are given as `path.py:Class` or installed."""
 
 from importlib import import_module
-from typing import Any
 
-from semgrid_eval.config import parse_config
-from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.models.model import Model
-from semgrid_eval.models.own import installed_models, model_in_file, model_installed, version_in_file, version_installed
+from semgrid_eval.models.own import installed_models, own_model, own_version
 
 _HERE = "semgrid_eval.models"
 MODELS = {
@@ -32,7 +29,7 @@ def find_model(name: str) -> type[Model]:
         module, _, cls = MODELS[name].partition(":")
         found: type[Model] = getattr(import_module(module), cls)
         return found
-    return model_in_file(name) if ":" in name else model_installed(name)
+    return own_model(name)
 
 
 def version_of(name: str) -> str:
@@ -41,37 +38,9 @@ def version_of(name: str) -> str:
     Raises:
         InputError: there is no such model, its code cannot be loaded, or it lacks a declared file.
     """
-    if name in MODELS:
-        return find_model(name).version
-    return version_in_file(name) if ":" in name else version_installed(name)
-
-
-def is_built_in(name: str) -> bool:
-    """Tell whether a model comes with this package."""
-    return name in MODELS
+    return find_model(name).version if name in MODELS else own_version(name)
 
 
 def is_named(name: str) -> bool:
     """Tell whether a name means a model, without loading one's own code."""
     return name in MODELS or ":" in name or name in installed_models()
-
-
-def model_names() -> tuple[str, ...]:
-    """List the names of built-in and installed models."""
-    return tuple(dict.fromkeys([*MODELS, *installed_models()]))
-
-
-def complete_settings(name: str, settings: dict[str, Any]) -> dict[str, Any]:
-    """Return a model's settings with all defaults, as they are where its code cannot be loaded.
-
-    Raises:
-        ConfigError: names the setting at fault and, for a key, the allowed ones.
-    """
-    try:
-        model = find_model(name)
-    except InputError:  # told when the model is needed
-        return settings
-    try:
-        return parse_config(model.Settings, settings).model_dump(mode="json")
-    except ConfigError as error:
-        raise ConfigError(f"settings.{error}".replace("settings.(top level)", "settings")) from None

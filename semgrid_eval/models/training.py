@@ -27,11 +27,7 @@ class DivergedError(SemgridError):
 
 @dataclass(frozen=True)
 class Trained:
-    """A trained network with its history.
-
-    Args:
-        seconds: time spent on updates, without validation and without what lay between a stop and a restart.
-    """
+    """A trained network with its history, and the time spent on updates, without validation and interruptions."""
 
     network: Network
     history: tuple[EpochRecord, ...]
@@ -100,16 +96,10 @@ class _Trainer:
             with seeded(_epoch_seed(self._seed, epoch), self._device):
                 started_s = time.monotonic()
                 loss = self._run_epoch(epoch, progress)
-                seconds = time.monotonic() - started_s
-            record = EpochRecord(
-                epoch=epoch + 1,
-                updates=self._config.updates_until(epoch + 1),
-                learning_rate=self._config.schedule.rate_in(epoch),
-                loss=loss,
-                validation_loss=self._validation_loss(validation) if validation else None,
-                seconds=round(seconds, 3),
-            )
-            history.append(record)
+                seconds = round(time.monotonic() - started_s, 3)
+            validated = self._validation_loss(validation) if validation else None
+            updates, rate = self._config.updates_until(epoch + 1), self._config.schedule.rate_in(epoch)
+            history.append(EpochRecord(epoch + 1, updates, rate, loss, validated, seconds))
             store.keep(self._network, self._optimizer, history)
         store.finish(self._network, history)
         return history
@@ -129,7 +119,8 @@ class _Trainer:
             total += self._update(self._windows.batch(chosen))
             # Reading the loss waits for the device, so it is not done after each update.
             if done == last - first or time.monotonic() - said_s > _REPORT_INTERVAL_S:
-                loss = self._checked(total.item() / done, first + done)
+                loss = total.item() / done
+                self._check(loss, first + done)
                 message = f"epoch {epoch + 1}/{self._config.epochs} loss {loss:.4f}"
                 progress(first + done, self._config.updates_until(self._config.epochs), message)
                 said_s = time.monotonic()
@@ -157,13 +148,12 @@ class _Trainer:
                 total += self._loss(batch).item() * len(batch.target)
         return total / len(windows)
 
-    def _checked(self, loss: float, update: int) -> float:
+    def _check(self, loss: float, update: int) -> None:
         if not math.isfinite(loss):
             raise DivergedError(
                 f"training diverged: the loss is {loss} after {update} updates; "
                 f"try a learning_rate below {self._config.schedule.learning_rate:g} or set clip_norm"
             )
-        return loss
 
 
 def _epoch_seed(seed: int, epoch: int) -> int:

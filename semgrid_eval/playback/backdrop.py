@@ -9,7 +9,7 @@ from google.protobuf.message import Message
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import codec, topics
-from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.png import read_header
 from semgrid_eval.recording.types import Pose
@@ -33,7 +33,8 @@ class Backdrop:
 
     Args:
         log: the open log.
-        grid: how its grids were made; frames are those of the camera that leads the target.
+        grid: how its grids were made; frames are those of the camera that leads the target, and `poses` the vehicle's
+            at each of them, in the odom frame.
 
     Raises:
         InputError: no camera leads the target.
@@ -46,8 +47,8 @@ class Backdrop:
         self.cameras = log.scene.cameras
         self._log = log
         self._calibrations = {name: log.calibration(name) for name in self.cameras}
-        self._poses = frame_poses(log, grid.camera, grid.integrator)
-        self._frames = {pose.stamp_ns: frame for frame, pose in enumerate(self._poses)}
+        self.poses = frame_poses(log, grid.camera, grid.integrator)
+        self._frames = {pose.stamp_ns: frame for frame, pose in enumerate(self.poses)}
 
     def frame_at(self, stamp_ns: int) -> int:
         """Return the index of the frame of a time.
@@ -59,14 +60,6 @@ class Backdrop:
             raise LogError(f"has no frame at {stamp_ns} ns", path=self._log.path)
         return self._frames[stamp_ns]
 
-    def stamp_ns(self, frame: int) -> int:
-        """Return the time of a frame."""
-        return self._poses[frame].stamp_ns
-
-    def yaw_rad(self, frame: int) -> float:
-        """Return where the vehicle points at a frame, in the odom frame."""
-        return self._poses[frame].yaw_rad
-
     def messages(self, first_ns: int, last_ns: int, *, shift_ns: int, grid_yaw_rad: float) -> Iterator[Outgoing]:
         """Iterate over transforms, calibrations and pictures from `first_ns` to `last_ns`, all times shifted.
 
@@ -77,7 +70,7 @@ class Backdrop:
         return heapq.merge(moving, self._pictures(first_ns, last_ns, shift_ns), key=lambda sent: sent.log_ns)
 
     def _transforms(self, first_ns: int, last_ns: int, shift_ns: int, grid_yaw_rad: float) -> Iterator[Outgoing]:
-        for pose in self._poses:
+        for pose in self.poses:
             if first_ns <= pose.stamp_ns <= last_ns:
                 now = Pose(pose.stamp_ns + shift_ns, pose.x_m, pose.y_m, pose.yaw_rad)
                 message = codec.transforms_message(now, self._calibrations, grid_yaw_rad=grid_yaw_rad)

@@ -19,7 +19,7 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import topics
 from semgrid_eval.log.codec import transforms_message
 from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, GridPlace, exact_message, viewer_message
-from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.playback.backdrop import Backdrop, Outgoing
 from semgrid_eval.playback.layout import prediction_topic, viewer_layout
@@ -87,7 +87,7 @@ def write_playback(
     record = read_run(run)
     scored = _read_scored(run, _row(record, row_name, run))
     chosen = _choose(scored, recording, every_recording=every_recording)
-    shifts_ns: dict[str, int] = {}
+    shifts_ns: dict[str, int] = {}  # what was added to each recording's times
     cameras: tuple[str, ...] = ()
     with atomic_file(out) as stream, MessageWriter(stream) as writer:
         end_ns = None
@@ -103,7 +103,16 @@ def write_playback(
                 cameras = cameras if backdrop is None else backdrop.cameras
             shifts_ns[name], end_ns = shift_ns, played.last_ns + shift_ns
             progress(done, len(chosen), name)
-        writer.metadata(RECORD, _metadata(record, scored, shifts_ns))
+        writer.metadata(
+            RECORD,
+            {
+                "run": record.title,
+                "row": row_name,
+                "result": scored.record.id,
+                "seed": json.dumps(scored.record.seed),
+                "shift_ns": json.dumps(shifts_ns),
+            },
+        )
     layout = out.with_suffix(".layout.json")
     write_json(layout, viewer_layout(scored.row, cameras))
     return Playback(out, layout, tuple(chosen))
@@ -167,8 +176,6 @@ def _check_shapes(
 
 def _choose(scored: _Scored, recording: str | None, *, every_recording: bool) -> list[str]:
     names = list(scored.windows_of)
-    if not names:
-        raise InputError("has no scored window", field=f"row {scored.row.name}")
     if every_recording:
         return names
     if recording is None:
@@ -201,17 +208,15 @@ class _Messages:
 
     Raises:
         LogError: the log lacks the frame of a target.
-        ResultError: the result does not tell the times of inputs, and there is no log to look them up in.
     """
 
     def __init__(self, scored: _Scored, name: str, backdrop: Backdrop | None) -> None:
         self._scored, self._backdrop = scored, backdrop
         self._indices = scored.windows_of[name]
-        windows = [scored.record.windows[i] for i in self._indices]
-        self._windows = windows
-        self._inputs_ns = [self._input_stamps_ns(window) for window in windows]
-        self.last_ns = windows[-1].target_stamp_ns
-        self.first_ns = windows[0].target_stamp_ns if backdrop is None else min(stamps[0] for stamps in self._inputs_ns)
+        self._windows = [scored.record.windows[i] for i in self._indices]
+        self.first_ns, self.last_ns = (self._windows[i].target_stamp_ns for i in (0, -1))
+        if backdrop is not None:
+            self.first_ns = min(window.input_stamps_ns[0] for window in self._windows)
 
     def messages(self, shift_ns: int) -> Iterator[Outgoing]:
         """Iterate over all messages in the order of time, all times shifted."""
@@ -226,25 +231,23 @@ class _Messages:
             return
         # Grids have the orientation of the first frame of their stretch of the log.
         first = self._backdrop.frame_at(self._windows[0].target_stamp_ns) - self._windows[0].target_frame
-        yaw_rad = self._backdrop.yaw_rad(first)
+        yaw_rad = self._backdrop.poses[first].yaw_rad
         yield from self._backdrop.messages(self.first_ns, self.last_ns, shift_ns=shift_ns, grid_yaw_rad=yaw_rad)
 
     def _grids(self, shift_ns: int) -> Iterator[Outgoing]:
-        for index, window, inputs_ns in zip(self._indices, self._windows, self._inputs_ns, strict=True):
-            for topic, values, layer, known_ns in self._layers(index, window, inputs_ns):
+        place, notes = self._scored.place, {"row": self._scored.row.name}
+        for index, window in zip(self._indices, self._windows, strict=True):
+            for topic, values, layer, known_ns in self._layers(index, window):
                 now_ns, publish_ns = window.target_stamp_ns + shift_ns, known_ns + shift_ns
-                place = self._scored.place
                 message = viewer_message(now_ns, values, layer, place)
-                yield Outgoing(now_ns, topic, message, publish_ns, {"row": self._scored.row.name})
+                yield Outgoing(now_ns, topic, message, publish_ns, notes)
                 if layer.names:
                     exact = exact_message(now_ns, values, layer, place)
-                    yield Outgoing(now_ns, f"{topic}/exact", exact, publish_ns, {"row": self._scored.row.name})
+                    yield Outgoing(now_ns, f"{topic}/exact", exact, publish_ns, notes)
 
-    def _layers(
-        self, index: int, window: WindowRecord, inputs_ns: Sequence[int]
-    ) -> Iterator[tuple[str, NDArray[np.uint8], GridLayer, int]]:
+    def _layers(self, index: int, window: WindowRecord) -> Iterator[tuple[str, NDArray[np.uint8], GridLayer, int]]:
         """Return topic, values (H, W), their meaning and since when they could be known, of each grid of a window."""
-        arrays, row = self._scored.arrays, self._scored.row
+        arrays, row, inputs_ns = self._scored.arrays, self._scored.row, window.input_stamps_ns
         for sensor, past in zip(row.facts.sensors, arrays["inputs"][index], strict=True):
             for back, (values, stamp_ns) in enumerate(zip(past[::-1], inputs_ns[::-1], strict=True)):
                 topic = f"{topics.GRID_INPUT}/{sensor}" + (f"/before_{back}" if back else "")
@@ -253,23 +256,3 @@ class _Messages:
         yield topics.GRID_MASK, arrays["mask"][index], MASK, window.target_stamp_ns
         yield prediction_topic(row.name), arrays["prediction"][index], CLASSES, inputs_ns[-1]
         yield topics.GRID_CERTAINTY, arrays["certainty"][index], CERTAINTY, inputs_ns[-1]
-
-    def _input_stamps_ns(self, window: WindowRecord) -> tuple[int, ...]:
-        if window.input_stamps_ns:
-            return window.input_stamps_ns
-        if self._backdrop is None:
-            raise ResultError("its result keeps no times of inputs; add the logs", field=f"row {self._scored.row.name}")
-        facts = self._scored.row.facts
-        last = self._backdrop.frame_at(window.target_stamp_ns) - facts.horizon_steps * facts.step_frames
-        return tuple(self._backdrop.stamp_ns(last - back * facts.step_frames) for back in reversed(range(facts.inputs)))
-
-
-def _metadata(record: RunRecord, scored: _Scored, shifts_ns: dict[str, int]) -> dict[str, str]:
-    """Say where the windows come from, and what was added to each recording's times."""
-    return {
-        "run": record.title,
-        "row": scored.row.name,
-        "result": scored.record.id,
-        "seed": json.dumps(scored.record.seed),
-        "shift_ns": json.dumps(shifts_ns),
-    }

@@ -1,5 +1,6 @@
 """The grids that a matrix needs: built once for each grid configuration, split into training and validation."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -37,12 +38,10 @@ class RunData:
         self._folder = logs
         self._logs = find_logs(logs)
         self._cache, self._executor, self._device, self._stage = cache, executor, device, stage
-        self._sensors: dict[str, list[str]] = {}
-        self._configs: dict[str, GridConfig] = {}
+        self._configs = {grid_digest(row.grid): row.grid for row in rows}
+        self._sensors = defaultdict[str, list[str]](list)
         for row in rows:
-            key = grid_digest(row.grid)
-            self._configs[key] = row.grid
-            self._sensors.setdefault(key, []).extend(row.sensors)
+            self._sensors[grid_digest(row.grid)].extend(row.sensors)
         self._sets: dict[str, GridDataSet] = {}
         self._stacked: dict[tuple[str, str], GridData] = {}
         self.failed: dict[str, str] = {}

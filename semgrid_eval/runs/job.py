@@ -11,7 +11,7 @@ from semgrid_eval.files import digest_value
 from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
 from semgrid_eval.models.device import choose_precision
 from semgrid_eval.models.model import Model
-from semgrid_eval.models.network import Network, NetworkSettings
+from semgrid_eval.models.network import NetworkSettings
 from semgrid_eval.models.registry import find_model, version_of
 from semgrid_eval.runs.data import grid_digest
 from semgrid_eval.runs.row import Row
@@ -33,11 +33,6 @@ class Resolved:
     model: type[Model]
     settings: Config
     version: str
-
-    @property
-    def is_network(self) -> bool:
-        """Whether gradients train it."""
-        return issubclass(self.model, Network)
 
     @property
     def is_known(self) -> bool:

@@ -178,7 +178,7 @@ def _combinations(axes: _Axes, place: str) -> Iterator[dict[str, Any]]:
     together = [dict(zip(axes.zip, values, strict=True)) for values in zip(*axes.zip.values(), strict=True)] or [{}]
     for values in itertools.product(*axes.grid.values()):
         for zipped in together:
-            yield {**dict(zip(axes.grid, values, strict=True)), **zipped}
+            yield dict(zip(axes.grid, values, strict=True)) | zipped
 
 
 def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, Any]:
@@ -192,7 +192,7 @@ def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, 
         name = name.replace("{" + key + "}", str(value))
     if "{" in name:
         raise ConfigError(f"{name!r} has a place that no axis fills", path=place, field="name")
-    return {**row, "name": name}
+    return row | {"name": name}
 
 
 def _merge(base: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """What a run would do, and about how long it would take on this machine: measured on the run's own windows."""
 
 import tempfile
-from collections.abc import Sequence
+from collections import defaultdict
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -12,21 +12,13 @@ from semgrid_eval.models.device import torch_threads
 from semgrid_eval.models.network import Network, NetworkSettings, ScheduleConfig, TrainingConfig, seeded_network
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage, silent_stage
-from semgrid_eval.runs.attempts import failure_of, make_worker
 from semgrid_eval.runs.job import Job, Training
 from semgrid_eval.runs.matrix import Matrix
-from semgrid_eval.runs.options import RunOptions
-from semgrid_eval.runs.units import Unit, plan_units, units_of, wanted_keys
+from semgrid_eval.runs.runner import failure_of, make_worker
+from semgrid_eval.runs.units import RunOptions, Unit, plan_units, units_of, wanted_rows
 from semgrid_eval.runs.worker import Worker
 
-CALIBRATION_EPOCHS = 3
-CALIBRATION_UPDATES = 4
-SAMPLE = {
-    "epochs": CALIBRATION_EPOCHS,
-    "updates_per_epoch": CALIBRATION_UPDATES,
-    "epoch_unit": "batches",
-    "schedule": ScheduleConfig(),
-}
+SAMPLE = {"epochs": 3, "updates_per_epoch": 4, "epoch_unit": "batches", "schedule": ScheduleConfig()}
 """What is measured of a training, however long it is and whatever its learning rate."""
 SCORING_SHARE = 0.4
 """Time of a forward pass against forward and backward together, as measured on CPUs; it prices validation."""
@@ -62,16 +54,14 @@ def plan_run(
     Raises:
         InputError: there is no log at all, or the device does not exist.
     """
-    wanted = wanted_keys(matrix, options.only)
+    units = plan_units(wanted_rows(matrix, options.only), matrix.seed)
     worker = make_worker(matrix, logs, out, options, stage)
     for data in worker.data:
         data.prepare()
-    units = {key: unit for key, unit in plan_units(matrix).items() if key in wanted}
-    sharing: dict[str, list[str]] = {key: [] for key in units}
+    sharing = defaultdict[str, list[str]](list)
     for row in matrix.rows:
         for key, _ in units_of(row, matrix.seed):
-            if key in sharing:
-                sharing[key].append(row.name)
+            sharing[key].append(row.name)
     speed = _Speed(worker)
     priced: set[str] = set()
     planned = []
@@ -80,11 +70,6 @@ def plan_run(
             planned.append(_plan_unit(worker, unit, tuple(sharing[key]), speed, priced))
             progress(number, len(units), unit.row.name)
     return planned
-
-
-def total_seconds(units: Sequence[PlannedUnit]) -> float:
-    """Sum the estimates."""
-    return sum(unit.seconds for unit in units)
 
 
 def _plan_unit(worker: Worker, unit: Unit, rows: tuple[str, ...], speed: "_Speed", priced: set[str]) -> PlannedUnit:
@@ -129,9 +114,8 @@ class _Speed:
     def seconds(self, job: Job, settings: NetworkSettings, epochs_made: int) -> float:
         """Estimate the rest of a training with its validation after each epoch."""
         sample = settings.model_copy(update={"training": settings.training.model_copy(update=SAMPLE)})
-        build = digest_value(
-            [job.row.model, job.resolved.version, sample.model_dump(mode="json"), asdict(job.row.given)]
-        )
+        resolved = job.resolved
+        build = digest_value([job.row.model, resolved.version, sample.model_dump(mode="json"), asdict(job.row.given)])
         if build not in self._seconds:
             self._seconds[build] = self._measure(job, sample)
         config, watched = settings.training, job.training and job.training.watched
@@ -145,4 +129,4 @@ class _Speed:
             network = seeded_network(job.resolved.model, sample, job.row.given, seed=0)
             path = Path(folder) / "sample"
             trained = train(network, job.training.windows, seed=0, device=self._worker.device, folder=path)
-        return min(epoch.seconds for epoch in trained.history) / CALIBRATION_UPDATES
+        return min(epoch.seconds for epoch in trained.history) / sample.training.updates_per_epoch

@@ -5,10 +5,11 @@ from typing import Any, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from semgrid_eval.config import Config, parse_config
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.model import Given, Model
-from semgrid_eval.models.registry import complete_settings, find_model, is_named, model_names
+from semgrid_eval.models.own import installed_models
+from semgrid_eval.models.registry import MODELS, find_model, is_named
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.results import RowFacts
 from semgrid_eval.windows.plan import WindowConfig
@@ -17,6 +18,13 @@ from semgrid_eval.windows.plan import WindowConfig
 def _target_sensors(known: dict[str, Any]) -> tuple[str, ...]:
     """Return the sensors of the target of a row's grid, none where that is at fault itself."""
     return known["grid"].target if "grid" in known else ()
+
+
+def _found(model: str) -> type[Model] | None:
+    try:
+        return find_model(model)
+    except InputError:  # told when the row's turn comes
+        return None
 
 
 class Row(Config):
@@ -50,7 +58,12 @@ class Row(Config):
     @field_validator("settings")
     @classmethod
     def _complete(cls, settings: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
-        return complete_settings(info.data.get("model", ""), settings)
+        if not (model := _found(info.data.get("model", ""))):
+            return settings
+        try:
+            return parse_config(model.Settings, settings).model_dump(mode="json")
+        except ConfigError as error:
+            raise ConfigError(f"settings.{error}".replace("settings.(top level)", "settings")) from None
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -58,7 +71,8 @@ class Row(Config):
             if sensor not in self.grid.sensors:
                 raise ValueError(f"sensor {sensor!r} is not one of {', '.join(self.grid.sensors)}")
         if not is_named(self.model):
-            raise ValueError(f"model {self.model!r} is not one of {', '.join(model_names())} or path.py:Class")
+            names = ", ".join(dict.fromkeys([*MODELS, *installed_models()]))
+            raise ValueError(f"model {self.model!r} is not one of {names} or path.py:Class")
         if self.scored_window.inputs != self.window.inputs:
             raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
         if found := self.found_model():
@@ -78,10 +92,7 @@ class Row(Config):
 
     def found_model(self) -> type[Model] | None:
         """Return the class of the row's model, None where its code cannot be loaded."""
-        try:
-            return find_model(self.model)
-        except InputError:  # told when the row's turn comes
-            return None
+        return _found(self.model)
 
     def settings_of(self, model: type[Model]) -> Config:
         """Return the settings as the model takes them.

@@ -1,22 +1,24 @@
-"""Runs a matrix: hands its units to an executor, and keeps the record of the run as it goes."""
+"""Runs a matrix: tries its units here or wherever an executor sends them, and keeps the record as it goes."""
 
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from functools import lru_cache, partial
 from pathlib import Path
 
 import torch
 
-from semgrid_eval.errors import SemgridError
-from semgrid_eval.executors import WorkerDied
+from semgrid_eval.errors import SemgridError, first_line
+from semgrid_eval.executors import NoRoomError, WorkerDied
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.progress import Stage, silent_stage
-from semgrid_eval.runs.attempts import finished, make_worker, unit_work
+from semgrid_eval.models.device import choose_device, is_out_of_memory, settle_process
+from semgrid_eval.models.registry import MODELS
+from semgrid_eval.progress import Progress, Stage, silent, silent_stage
+from semgrid_eval.runs.data import RunData
 from semgrid_eval.runs.matrix import Matrix
-from semgrid_eval.runs.options import RunOptions
 from semgrid_eval.runs.record import Clock, Outcome, run_record
 from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.thumbnails import keep_pictures
-from semgrid_eval.runs.units import plan_units, wanted_keys, wanted_rows
+from semgrid_eval.runs.units import RunOptions, Unit, plan_units, wanted_rows
 from semgrid_eval.runs.worker import Worker
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
@@ -32,8 +34,8 @@ def run_matrix(
         ConfigError: `options.only` asks for a row that the matrix does not have.
     """
     started = Clock()
-    units = plan_units(matrix)
-    wanted = wanted_keys(matrix, options.only)
+    rows = wanted_rows(matrix, options.only)
+    units, wanted = plan_units(matrix.rows, matrix.seed), plan_units(rows, matrix.seed)
     worker = make_worker(matrix, logs, out, options, stage)
     for data in worker.data:
         data.prepare()
@@ -42,7 +44,7 @@ def run_matrix(
 
     def look_for_others() -> None:
         for key, unit in units.items():
-            if key not in outcomes and key not in wanted and (found := finished(worker, unit)):
+            if key not in outcomes and key not in wanted and (found := _finished(worker, unit)):
                 outcomes[key] = found
 
     def keep_record() -> results.RunRecord:
@@ -53,12 +55,11 @@ def run_matrix(
     look_for_others()
     keep_record()
     if options.pictures:
-        rows = wanted_rows(matrix, options.only)
         keep_pictures(out, _scored_windows(worker, rows), options.grid_executor, stage)
-    keys = [key for key in units if key in wanted]
-    with unit_work(matrix, logs, out, options, worker) as (work, progress):
+    keys = list(wanted)
+    with _unit_work(matrix, logs, out, options, worker) as (work, progress):
         progress(0, len(keys))
-        for done, (index, outcome) in enumerate(options.executor.run(work, [units[key] for key in keys]), start=1):
+        for done, (index, outcome) in enumerate(options.executor.run(work, list(wanted.values())), start=1):
             outcomes[keys[index]] = Outcome(None, outcome.reason, {}) if isinstance(outcome, WorkerDied) else outcome
             keep_record()
             progress(done, len(keys))
@@ -71,3 +72,96 @@ def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[Windo
     for row in rows:
         with suppress(SemgridError, torch.OutOfMemoryError):  # its units will tell
             yield worker.scored_windows(row)[0], row.grid
+
+
+def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:
+    """Make a worker of this process for the units of a matrix; it builds or reads grids when they are asked for.
+
+    Raises:
+        InputError: there is no log at all, or the device does not exist.
+    """
+    settle_process()
+    device = choose_device(options.device)
+    # Where others do the work, the grids here need no room on the device.
+    place = device if options.executor.parallel == 1 else torch.device("cpu")
+    made = partial(
+        RunData, cache=options.grids, rows=matrix.rows, executor=options.grid_executor, device=place, stage=stage
+    )
+    data = made(logs)
+    return Worker(
+        out=out,
+        trainings=options.trainings or out / "trainings",
+        training_data=data,
+        scored_data=made(options.validation_logs) if options.validation_logs else data,
+        device=device,
+        threads=options.executor.threads or torch.get_num_threads(),
+        example_seed=matrix.seed,
+        stage=stage,
+    )
+
+
+@contextmanager
+def _unit_work(
+    matrix: Matrix, logs: Path, out: Path, options: RunOptions, worker: Worker
+) -> Iterator[tuple[Callable[[Unit], Outcome], Progress]]:
+    """Return the function that tries one unit, here or wherever the executor sends it, and who is told of each."""
+    if options.executor.parallel == 1:
+        yield partial(_attempt, worker), silent  # the stages of a unit show themselves
+        return
+    # Elsewhere the same folder may be another one: paths must not depend on where a process stands.
+    there = RunOptions(
+        options.device,
+        options.grids.resolve(),
+        command="",
+        validation_logs=options.validation_logs and options.validation_logs.resolve(),
+        trainings=options.trainings and options.trainings.resolve(),
+    )
+    place = (matrix.model_dump_json(), logs.resolve(), out.resolve(), there, options.executor.threads)
+    with worker.stage("rows") as progress:
+        yield partial(_attempt_elsewhere, place), progress
+
+
+def _finished(worker: Worker, unit: Unit) -> Outcome | None:
+    """Find what an earlier run left of a unit."""
+    try:
+        job = worker.look(unit.row, unit.seed)
+    except (SemgridError, torch.OutOfMemoryError):
+        return None
+    return Outcome(job.result_id, None, job.left_out) if worker.is_done(job) else None
+
+
+def failure_of(error: Exception, row: Row) -> str | None:
+    """Say in one line why a row failed; None where the fault is ours and is to be seen whole."""
+    if isinstance(error, SemgridError):
+        return str(error)
+    if is_out_of_memory(error):
+        return f"out of memory: {first_line(error)}"
+    # What torch and its libraries raise, or code of one's own that they call.
+    if isinstance(error, RuntimeError) or row.model not in MODELS:
+        return f"{type(error).__name__}: {first_line(error)}"
+    return None
+
+
+def _attempt_elsewhere(place: tuple[str, Path, Path, RunOptions, int | None], unit: Unit) -> Outcome:
+    return _attempt(_worker_at(*place), unit)
+
+
+@lru_cache(maxsize=1)
+def _worker_at(matrix: str, logs: Path, out: Path, options: RunOptions, threads: int | None) -> Worker:
+    """Make the worker of a process that gets units of one run; it keeps the grids between them."""
+    if threads is not None:
+        torch.set_num_threads(threads)  # torch may have been imported before its environment was set
+    return make_worker(Matrix.model_validate_json(matrix), logs, out, options, silent_stage)
+
+
+def _attempt(worker: Worker, unit: Unit) -> Outcome:
+    try:
+        job = worker.run(unit.row, unit.seed)
+    except Exception as error:
+        reason = failure_of(error, unit.row)
+        if reason is None:
+            raise
+        if is_out_of_memory(error):
+            raise NoRoomError(reason) from error
+        return Outcome(None, reason, {})
+    return Outcome(job.result_id, None, job.left_out)

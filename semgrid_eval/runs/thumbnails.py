@@ -13,7 +13,7 @@ from semgrid_eval.executors import Executor
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import topics
 from semgrid_eval.log.container import damage_as_log_error
-from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.motion import Integrator
 from semgrid_eval.progress import Stage
 from semgrid_eval.recording.png import decode_colour, decode_ids, encode_gray, read_header, with_palette
@@ -52,11 +52,7 @@ def keep_pictures(
 
     Logs that are gone, damaged or not what they were give none: a run needs no pictures.
 
-    Args:
-        run: folder of the run.
-        windows: sets of windows, each with how its grids were made.
-        executor: works on several logs at once.
-        stage: shows progress.
+    `windows` are sets of them, each with how its grids were made.
 
     Raises:
         InputError: the folder cannot be written to.

@@ -1,13 +1,43 @@
-"""What a matrix comes down to: its distinct units, each a row with one seed, and those of the rows asked for."""
+"""How a matrix is run, and what it comes down to: its distinct units, each a row with one seed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import NamedTuple
 
 from semgrid_eval.errors import ConfigError
+from semgrid_eval.executors import Executor, InProcess
 from semgrid_eval.files import digest_value
 from semgrid_eval.runs.matrix import Matrix
 from semgrid_eval.runs.row import Row
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a matrix is run; but for the logs to score, nothing here changes its numbers on one machine.
+
+    Args:
+        device: `auto`, `cpu`, `cuda`, `cuda:1`, ...
+        grids: folder in which grids are kept.
+        command: how the run was started, for the record.
+        only: names or patterns of the rows to work on, all where it is empty; what others have is kept on record.
+        executor: where rows are trained and scored.
+        grid_executor: where grids are built and pictures made small.
+        validation_logs: folder of the logs to score, where they are not among those to train on.
+        trainings: folder of the trainings, the run's own if not given; what another run has trained is found there.
+        pictures: whether to keep small pictures of the windows' frames for the report.
+    """
+
+    device: str
+    grids: Path
+    command: str
+    only: tuple[str, ...] = ()
+    executor: Executor = field(default_factory=InProcess)
+    grid_executor: Executor = field(default_factory=InProcess)
+    pictures: bool = True
+    validation_logs: Path | None = None
+    trainings: Path | None = None
 
 
 class Unit(NamedTuple):
@@ -17,11 +47,11 @@ class Unit(NamedTuple):
     seed: int | None
 
 
-def plan_units(matrix: Matrix) -> dict[str, Unit]:
-    """List the distinct units of a matrix by key; rows that mean the same share them."""
+def plan_units(rows: Iterable[Row], first_seed: int) -> dict[str, Unit]:
+    """List the distinct units of rows by key; rows that mean the same share them."""
     units: dict[str, Unit] = {}
-    for row in matrix.rows:
-        for key, unit in units_of(row, matrix.seed):
+    for row in rows:
+        for key, unit in units_of(row, first_seed):
             units.setdefault(key, unit)
     return units
 
@@ -40,19 +70,10 @@ def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:
     Raises:
         ConfigError: a name or pattern fits no row.
     """
-    found = {pattern: [row for row in matrix.rows if _is_asked(row, pattern)] for pattern in only}
+    # A name may itself hold signs of patterns.
+    found = {each: [row for row in matrix.rows if row.name == each or fnmatchcase(row.name, each)] for each in only}
     for pattern, rows in found.items():
         if not rows:
             names = ", ".join(sorted(row.name for row in matrix.rows))
             raise ConfigError(f"{pattern!r} is not a row of this matrix: {names}", field="row")
     return [row for row in matrix.rows if not only or any(row in rows for rows in found.values())]
-
-
-def wanted_keys(matrix: Matrix, only: Sequence[str]) -> set[str]:
-    """Return the keys of the units of the rows that are asked for."""
-    return {key for row in wanted_rows(matrix, only) for key, _ in units_of(row, matrix.seed)}
-
-
-def _is_asked(row: Row, pattern: str) -> bool:
-    """Tell whether a name or pattern means a row; a name may itself hold signs of patterns."""
-    return row.name == pattern or fnmatchcase(row.name, pattern)

@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
@@ -37,15 +37,15 @@ from semgrid_eval.windows.plan import WindowConfig, WindowPlan, training_windows
 WindowPlanner = Callable[[Sequence[int], WindowConfig], WindowPlan]
 
 
-@dataclass(frozen=True)
-class Workplace:
-    """Where and with what a worker works.
+@dataclass(eq=False)
+class Worker:
+    """Fits and scores single units; holds the grids that they share.
+
+    Its methods raise a `SemgridError` where a row cannot be run; the message says why.
 
     Args:
-        out: folder of the run.
-        trainings: folder of the trainings.
-        data: the grids to train on.
-        scored_data: the grids to score on, mostly the same.
+        out: folder of the run, and `trainings` that of the trainings.
+        training_data: the grids to train on, and `scored_data` those to score on, mostly the same.
         device: where models run.
         threads: of numeric libraries where the units are worked on, which may be another process.
         example_seed: of the results whose predictions are kept for a report's examples.
@@ -54,34 +54,23 @@ class Workplace:
 
     out: Path
     trainings: Path
-    data: RunData
+    training_data: RunData
     scored_data: RunData
     device: torch.device
     threads: int
     example_seed: int
     stage: Stage
-
-
-class Worker:
-    """Fits and scores single units; holds the grids that they share."""
-
-    def __init__(self, place: Workplace) -> None:
-        self._place = place
-        self.device, self.threads, self.stage = place.device, place.threads, place.stage
-        self._selected: dict[object, tuple[WindowSet, dict[int, str]]] = {}
-        self._kept: set[str] = set()  # ids of the windows that are known to lie in the run's folder
+    _selected: dict[object, tuple[WindowSet, dict[int, str]]] = field(default_factory=dict, init=False)
+    # Ids of the windows that are known to lie in the run's folder.
+    _kept: set[str] = field(default_factory=set, init=False)
 
     @property
     def data(self) -> tuple[RunData, ...]:
         """Where grids come from: one folder of logs, or one to train on and one to score on."""
-        return tuple(dict.fromkeys((self._place.data, self._place.scored_data)))
+        return tuple(dict.fromkeys((self.training_data, self.scored_data)))
 
     def look(self, row: Row, seed: int | None) -> Job:
-        """Resolve a row with one seed into its model, its windows, its training and the id of its result.
-
-        Raises:
-            SemgridError: the row cannot be run; the message says why.
-        """
+        """Resolve a row with one seed into its model, its windows, its training and the id of its result."""
         resolved = resolve(row)
         scored, left_out = self.scored_windows(row)
         windows_id = id_of_windows(row, scored)
@@ -92,21 +81,13 @@ class Worker:
         return Job(row, seed, resolved, result_id, config, scored, windows_id, training, left_out)
 
     def scored_windows(self, row: Row) -> tuple[WindowSet, dict[str, str]]:
-        """Select the windows on which a row is scored, and say why some logs give none.
-
-        Raises:
-            SemgridError: there is no such window.
-        """
-        data = self._place.scored_data
+        """Select the windows on which a row is scored, and say why some logs give none."""
+        data = self.scored_data
         scored, too_short = self._select(data, row, row.validation_split, row.scored_window, validation_windows)
         return scored, {data.log_of[scored.data.recordings[index]]: why for index, why in too_short.items()}
 
     def run(self, row: Row, seed: int | None) -> Job:
-        """Make sure that the result of a row with one seed lies in the run's folder, and return what was resolved.
-
-        Raises:
-            SemgridError: the row cannot be run; the message says why.
-        """
+        """Make sure that the result of a row with one seed lies in the run's folder, and return what was resolved."""
         job = self.look(row, seed)
         self._keep_windows(job.scored, job.windows_id)
         if job.resolved.is_known and self.is_done(job):
@@ -116,21 +97,22 @@ class Worker:
             with self.stage(f"score {row.name}") as progress:
                 evaluation = evaluate(model, job.scored, mask_mode=row.mask_mode, spec=row.grid.spec, progress=progress)
         record = self._result_record(job, model, train_seconds, evaluation.seconds)
-        folder = results.result_folder(self._place.out, job.result_id)
+        folder = results.result_folder(self.out, job.result_id)
         _keep_result(folder, record, evaluation, self._history(job), with_predictions=self._shows(seed))
         return job
 
     def is_done(self, job: Job) -> bool:
         """Tell whether all that a job leaves lies in the run's folder."""
-        folder = results.result_folder(self._place.out, job.result_id)
+        folder = results.result_folder(self.out, job.result_id)
         with_history = self._history(job) is not None
         return results.is_done(folder, with_predictions=self._shows(job.seed), with_history=with_history)
 
     def _shows(self, seed: int | None) -> bool:
-        return seed in (None, self._place.example_seed)
+        return seed in (None, self.example_seed)
 
     def _history(self, job: Job) -> Path | None:
-        return job.training.folder / TRAINING_HISTORY_FILE if job.training and job.resolved.is_network else None
+        is_network = issubclass(job.resolved.model, Network)
+        return job.training.folder / TRAINING_HISTORY_FILE if job.training and is_network else None
 
     def _select(
         self, data: RunData, row: Row, split: str, config: WindowConfig, plan: WindowPlanner
@@ -149,28 +131,27 @@ class Worker:
 
         So one training serves the scores on all sorts of logs.
         """
-        data = self._place.data
-        if self._place.scored_data is data:
+        if self.scored_data is self.training_data:
             return scored
         try:
-            return self._select(data, row, row.validation_split, row.window, validation_windows)[0]
+            return self._select(self.training_data, row, row.validation_split, row.window, validation_windows)[0]
         except InputError:  # no such logs among them, and none is needed
             return None
 
     def _training(self, resolved: Resolved, row: Row, seed: int | None, scored: WindowSet) -> Training:
-        windows = self._select(self._place.data, row, row.train_split, row.window, training_windows)[0]
-        watched = self._watched(row, scored) if resolved.is_network else None
+        windows = self._select(self.training_data, row, row.train_split, row.window, training_windows)[0]
+        watched = self._watched(row, scored) if issubclass(resolved.model, Network) else None
         training_id = id_of_training(
             resolved, row, seed, self.device, threads=self.threads, windows=windows, watched=watched
         )
-        return Training(training_id, self._place.trainings / training_id, windows, watched)
+        return Training(training_id, self.trainings / training_id, windows, watched)
 
     def _fitted(self, job: Job) -> tuple[Model, float | None]:
         """Return the job's model, ready to predict, and how many seconds gradients have trained it."""
-        made, settings, given = job.resolved.model, job.resolved.settings, job.row.given
+        made, settings = job.resolved.model, job.resolved.settings
         if job.training and issubclass(made, Network):
-            return self._trained(job.training, seeded_network(made, settings, given, job.seed or 0), job)
-        model = made(settings, given)
+            return self._trained(seeded_network(made, settings, job.row.given, job.seed or 0), job.training, job)
+        model = made(settings, job.row.given)
         if isinstance(model, torch.nn.Module):
             model.to(self.device).eval()
         if job.training:
@@ -178,7 +159,7 @@ class Worker:
                 model.fit(job.training.windows)
         return model, None
 
-    def _trained(self, training: Training, network: Network, job: Job) -> tuple[Network, float]:
+    def _trained(self, network: Network, training: Training, job: Job) -> tuple[Network, float]:
         seed = job.seed or 0
         with self.stage(f"train {job.row.name} (seed {seed})") as progress:
             trained = train(
@@ -205,7 +186,7 @@ class Worker:
             log_digests=tuple(sorted(set(job.scored.data.digests))),
             seed=job.seed,
             windows_id=job.windows_id,
-            windows=window_records(job.scored, self._place.scored_data.log_of),
+            windows=window_records(job.scored, self.scored_data.log_of),
             device=str(self.device),
             train_seconds=train_seconds,
             predict_seconds=round(predict_seconds, 6),
@@ -216,9 +197,9 @@ class Worker:
         if windows_id in self._kept:
             return
         try:
-            results.read_windows(self._place.out, windows_id)
+            results.read_windows(self.out, windows_id)
         except ResultError:  # not there yet, or damaged
-            write_arrays(results.windows_file(self._place.out, windows_id), window_arrays(windows))
+            write_arrays(results.windows_file(self.out, windows_id), window_arrays(windows))
         self._kept.add(windows_id)
 
 

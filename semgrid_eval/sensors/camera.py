@@ -14,7 +14,7 @@ from semgrid_eval.motion import EgoMotion, Integrator, Pose
 from semgrid_eval.sensors.sensor import Points, SensorConfig
 
 if TYPE_CHECKING:
-    from semgrid_eval.log.store import LogReader
+    from semgrid_eval.log.reader import LogReader
     from semgrid_eval.recording.types import CameraFrame
 
 _SIZE_PX = (16, 8192)
@@ -26,10 +26,8 @@ class CameraSensor(SensorConfig):
     Args:
         camera: its name in the log; None takes a log's only one.
         image_size_px: width and height to which labels and disparity are brought before projection (reading 22).
-        top_px: first row.
-        bottom_px: end of the rows; None reaches to the edge.
-        left_px: first column.
-        right_px: end of the columns; None reaches to the edge.
+        top_px: first row, and `left_px` first column.
+        bottom_px: end of the rows, and `right_px` of the columns; None reaches to the edge.
     """
 
     kind: Literal["camera"] = "camera"

@@ -13,7 +13,7 @@ from semgrid_eval.sensors.camera import CameraSensor, read_cameras
 from semgrid_eval.sensors.sensor import Kind, Points, SensorConfig
 
 if TYPE_CHECKING:
-    from semgrid_eval.log.store import LogReader
+    from semgrid_eval.log.reader import LogReader
 
 KINDS: dict[str, Kind] = {"camera": Kind(CameraSensor, read_cameras)}
 _DEFAULT_KIND = "camera"
@@ -40,12 +40,7 @@ Sensor = SerializeAsAny[Annotated[SensorConfig, BeforeValidator(_of_its_kind)]]
 def read_points(
     log: "LogReader", sensors: Mapping[str, SensorConfig], class_by_label: NDArray[np.uint8]
 ) -> Iterator[Points]:
-    """Iterate over what sensors of all kinds saw, in the order of time.
-
-    Args:
-        log: an open log.
-        sensors: settings by name.
-        class_by_label: (256,) from label id to grid class.
+    """Iterate over what sensors of all kinds saw, in the order of time; `class_by_label` is as `Kind` says.
 
     Raises:
         LogError: the log is damaged or lacks what a sensor needs.

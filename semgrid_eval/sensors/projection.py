@@ -72,12 +72,8 @@ def ground_slope(
 ) -> Floats:
     """Return the metres forward and left (2, H, W) for each metre of depth along the optical axis, by pixel.
 
-    A point of depth Z lies at the camera's place + Z * slope, in the vehicle frame.
-
-    Args:
-        calibration: in pixels of the source image.
-        source_size_px: width and height of the source image.
-        image_size_px: width and height after resizing; K is scaled with half-pixel centres.
+    A point of depth Z lies at the camera's place + Z * slope, in the vehicle frame. Sizes are width and height of the
+    source image and after resizing; K is scaled with half-pixel centres.
     """
     width, height = image_size_px
     scale_u, scale_v = width / source_size_px[0], height / source_size_px[1]
@@ -95,11 +91,7 @@ def unit_projection(calibration: CameraCalibration, size_px: tuple[int, int]) ->
     """Return the projection (3, 4) of points in the vehicle frame, (x, y, z, 1), to an image whose sides are 1 long.
 
     It gives (w u, w v, w): u is 0 at the left edge and 1 at the right one, v at the upper and the lower one, w is the
-    depth in metres; what has w <= 0 lies behind the camera.
-
-    Args:
-        calibration: in pixels of the source image.
-        size_px: width and height of the source image.
+    depth in metres; what has w <= 0 lies behind the camera. `size_px` are width and height of the source image.
     """
     width, height = size_px
     camera_matrix = np.array(

@@ -11,7 +11,7 @@ from pydantic import Field
 from semgrid_eval.config import Config
 
 if TYPE_CHECKING:  # whoever reads settings alone needs no reader of logs
-    from semgrid_eval.log.store import LogReader
+    from semgrid_eval.log.reader import LogReader
 
 
 class SensorConfig(Config):
@@ -35,8 +35,8 @@ class Points:
     Args:
         sensor: its name in the grid's configuration.
         stamp_ns: when the points were seen.
-        forward_m: float64, in the vehicle frame of that time (ISO 8855, origin on the ground under the rear axle).
-        left_m: likewise.
+        forward_m: float64, and `left_m`, in the vehicle frame of that time (ISO 8855, origin on the ground under the
+            rear axle).
         class_id: uint8 grid class; where it is `NO_POINT` there is nothing, whatever the coordinates say.
     """
 

@@ -11,12 +11,7 @@ TOLERANCE_NS = 1_000_000
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What all sensors have seen last at a time; a sensor without a recent observation is left out.
-
-    Args:
-        stamp_ns: the time.
-        points: by sensor, each with the time of its own.
-    """
+    """What all sensors have seen last at a time; a sensor without a recent observation is left out."""
 
     stamp_ns: int
     points: Mapping[str, Points]
@@ -25,10 +20,7 @@ class Snapshot:
 def synchronise(observations: Iterable[Points], sensors: Mapping[str, SensorConfig], leader: str) -> Iterator[Snapshot]:
     """Iterate over the times of the leading sensor with the newest observation that each sensor had made by then.
 
-    Args:
-        observations: of all sensors, in the order of time.
-        sensors: settings by name, which say how old an observation may be.
-        leader: name of the sensor whose times count.
+    Observations are of all sensors, in the order of time; `sensors` say how old one may be.
     """
     newest: dict[str, Points] = {}
     now: Points | None = None

@@ -59,11 +59,6 @@ class WindowSet:
     def __len__(self) -> int:
         return len(self.target_frames)
 
-    @property
-    def grids_per_window(self) -> int:
-        """How many grids a predictor sees of a window, S times T."""
-        return len(self.sensors) * self.inputs.shape[1]
-
     def to(self, device: torch.device) -> "WindowSet":
         """Return the same windows with all tensors on another device."""
         tensors = ("sensor_rows", "inputs", "target_frames", "shift_cells", "lead_s")
@@ -104,17 +99,16 @@ class WindowSet:
 def select_windows(
     data: GridData, windows: Sequence[Window], *, sensors: Sequence[str], translate: bool = True
 ) -> WindowSet:
-    """Resolve windows of equal shape against grid data, input grids coming from `sensors`.
+    """Resolve planned windows of equal shape against grid data, input grids coming from `sensors`.
 
     Raises:
-        InputError: there is no window, a window leaves its recording, or a sensor does not exist.
+        InputError: there is no window, or a sensor does not exist.
     """
     if not windows:
         raise InputError("there are no windows")
     recording = np.array([window.recording for window in windows])
     frames = np.array([(*window.input_frames, window.target_frame) for window in windows])
     frames += data.first_frames[recording][:, None]
-    _check_frames(data, windows, frames, recording)
     inputs, target = frames[:, :-1], frames[:, -1]
     moved_m = data.position_m[target][:, None] - data.position_m[inputs]
     lead_ns = data.stamps_ns[target][:, None] - data.stamps_ns[inputs]
@@ -138,14 +132,3 @@ def window_arrays(windows: WindowSet, *, batch: int = 64) -> dict[str, NDArray[n
     inputs, target, mask = (torch.cat(column).numpy() for column in zip(*parts, strict=True))
     actors = windows.actors(slice(None))
     return {"inputs": inputs, "target": target, "mask": mask, **({} if actors is None else {"actors": actors})}
-
-
-def _check_frames(
-    data: GridData, windows: Sequence[Window], frames: NDArray[np.int64], recording: NDArray[np.int64]
-) -> None:
-    first, last = data.first_frames[recording], data.first_frames[recording + 1] - 1
-    outside = (frames.min(axis=1) < first) | (frames.max(axis=1) > last)
-    if outside.any():
-        window = windows[int(outside.argmax())]
-        name, count = data.recordings[window.recording], data.frame_counts[window.recording]
-        raise InputError(f"{name} has {count} frames, and a window needs frame {window.target_frame}")

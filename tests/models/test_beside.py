@@ -1,5 +1,6 @@
 """What lies beside a model's file: found by its code alone, and part of what the file is made of."""
 
+import importlib
 import sys
 
 import pytest
@@ -74,6 +75,17 @@ def test_sources_are_the_file_and_what_it_has_imported_from_beside_it(tmp_path):
     assert not file.is_current()
     (tmp_path / "helper.py").unlink()
     assert not file.is_current()
+
+
+def test_a_neighbour_that_the_caller_has_imported_is_a_source_too(tmp_path, monkeypatch):
+    path = write(tmp_path, "a")
+    monkeypatch.syspath_prepend(tmp_path)
+    helper = importlib.import_module("helper")
+    file = ModelFile(path)
+    file.load()
+    assert tmp_path / "helper.py" in file.sources()
+    assert sys.modules["helper"] is helper
+    del sys.modules["helper"]
 
 
 def test_what_was_not_imported_at_first_cannot_be_imported_later(tmp_path):

@@ -8,6 +8,7 @@ from semgrid_eval.models import device as device_module
 from semgrid_eval.models.device import (
     choose_device,
     choose_precision,
+    cpu_facts,
     cpu_has_bf16,
     is_out_of_memory,
     seeded,
@@ -62,13 +63,15 @@ def test_gpus_are_named_as_this_process_sees_them(monkeypatch, listed, expected)
 )
 def test_bf16_is_read_from_the_cpus_flags(tmp_path, monkeypatch, text, expected):
     (tmp_path / "cpuinfo").write_text(text)
-    monkeypatch.setattr(device_module, "_CPU_FLAGS", tmp_path / "cpuinfo")
-    assert cpu_has_bf16.__wrapped__() is expected
+    monkeypatch.setattr(device_module, "_CPU_FILE", tmp_path / "cpuinfo")
+    monkeypatch.setattr(device_module, "cpu_facts", cpu_facts.__wrapped__)
+    assert cpu_has_bf16() is expected
 
 
 def test_system_without_cpu_flags_has_no_bf16(tmp_path, monkeypatch):
-    monkeypatch.setattr(device_module, "_CPU_FLAGS", tmp_path / "none")
-    assert cpu_has_bf16.__wrapped__() is False
+    monkeypatch.setattr(device_module, "_CPU_FILE", tmp_path / "none")
+    monkeypatch.setattr(device_module, "cpu_facts", cpu_facts.__wrapped__)
+    assert cpu_has_bf16() is False
 
 
 def test_seeded_block_repeats_and_leaves_the_generator_as_it_was():

@@ -12,7 +12,7 @@ from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.encoder_decoder import EncoderDecoder
-from semgrid_eval.models.network import ScheduleConfig, TrainingConfig, input_planes, masked_loss, one_hot_planes
+from semgrid_eval.models.network import ScheduleConfig, TrainingConfig, input_planes, masked_loss
 from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import Window
@@ -20,20 +20,14 @@ from semgrid_eval.windows.plan import Window
 GRIDS = torch.randint(0, CLASS_COUNT, (2, 3, 8, 8), generator=torch.Generator().manual_seed(0), dtype=torch.uint8)
 
 
-def test_one_hot_planes_put_each_grids_classes_side_by_side():
-    planes = one_hot_planes(GRIDS, torch.bfloat16)
+def test_planes_put_each_grids_classes_side_by_side_in_what_layers_compute_in():
+    assert input_planes(GRIDS[:, :, None]).dtype == torch.float32
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        planes = input_planes(GRIDS[:, :, None])
     expected = F.one_hot(GRIDS.long(), CLASS_COUNT).permute(0, 1, 4, 2, 3).flatten(1, 2)
     assert planes.dtype == torch.bfloat16
     assert planes.is_contiguous(memory_format=torch.channels_last)
     assert torch.equal(planes.long(), expected)
-
-
-def test_planes_of_inputs_are_in_what_layers_compute_in():
-    past = GRIDS[:, :, None]
-    assert input_planes(past).dtype == torch.float32
-    with torch.autocast("cpu", dtype=torch.bfloat16):
-        assert input_planes(past).dtype == torch.bfloat16
-    assert torch.equal(input_planes(past), one_hot_planes(GRIDS, torch.float32))
 
 
 @pytest.mark.parametrize("precision", ["float32", "bf16"])

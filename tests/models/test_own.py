@@ -7,11 +7,12 @@ import torch
 from support.models import made, network
 from support.recordings import random_recording
 
+from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
-from semgrid_eval.models.model import Model, NoSettings
+from semgrid_eval.models.model import Model
 from semgrid_eval.models.network import Network
 from semgrid_eval.models.own import ENTRY_POINT_GROUP
-from semgrid_eval.models.registry import find_model, model_names, version_of
+from semgrid_eval.models.registry import find_model, is_named, version_of
 from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import Window
@@ -112,7 +113,7 @@ def test_installed_entry_point_is_a_model(monkeypatch, batch):
     )
     model = made(find_model("mine"))
     assert torch.equal(model.predict(batch).argmax(dim=1), batch.past[:, 0, -1].long())
-    assert model_names()[-1] == "mine"
+    assert is_named("mine")
     assert version_of("mine") != version_of("newest")
     with pytest.raises(InputError, match=r"no model 'yours' is installed \(mine found\)"):
         find_model("yours")
@@ -141,7 +142,7 @@ def test_model_that_cannot_be_made_or_fitted_is_named(own, batch):
     with pytest.raises(InputError, match=r"own_models\.py:Silent: raised NotImplementedError: Silent has no `predict`"):
         made(find_model(f"{own}:Silent")).predict(batch)
     with pytest.raises(InputError, match=r"own_models\.py:Silent: raised AttributeError: .*unheard_of"):
-        find_model(f"{own}:Silent").check(NoSettings(), None)
+        find_model(f"{own}:Silent").check(Config(), None)
 
 
 def test_a_declared_file_that_is_missing_is_named_and_another_is_another_version(own):

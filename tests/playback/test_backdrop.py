@@ -87,7 +87,7 @@ def test_the_vehicle_moves_as_the_grids_do_where_frames_lie_between_motion_sampl
         backdrop = Backdrop(reader, grid)
         first, last = (int(recording.stamps_ns[place]) for place in (0, -1))
         sent_tf = [m for m in backdrop.messages(first, last, shift_ns=0, grid_yaw_rad=0.0) if m.topic == TRANSFORMS]
-        yaw_rad = [backdrop.yaw_rad(frame) for frame in range(8)]
+        yaw_rad = [backdrop.poses[frame].yaw_rad for frame in range(8)]
     np.testing.assert_allclose(np.subtract(yaw_rad, yaw_rad[0]), recording.yaw_rad, atol=1e-12)
     places = [message.message.transforms[0].translation for message in sent_tf]
     away_m = np.array([(place.x - places[0].x, place.y - places[0].y) for place in places])
@@ -106,7 +106,7 @@ def test_frames_of_what_is_not_a_camera_cannot_be_found(log):
 def test_frames_are_found_by_their_times(log):
     backdrop = Backdrop(log, grid_of("rear"))
     assert backdrop.frame_at(START_NS + 3 * FRAME_NS) == 3
-    assert backdrop.stamp_ns(3) == START_NS + 3 * FRAME_NS
+    assert backdrop.poses[3].stamp_ns == START_NS + 3 * FRAME_NS
     with pytest.raises(LogError, match=r"log.mcap: has no frame at 17 ns"):
         backdrop.frame_at(17)
 

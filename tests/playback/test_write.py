@@ -1,4 +1,3 @@
-import json
 import math
 import re
 import shutil
@@ -20,8 +19,8 @@ from semgrid_eval.log.codec import stamp_ns
 from semgrid_eval.log.store import LogReader, write_log
 from semgrid_eval.playback.write import GAP_NS, write_playback
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.options import RunOptions
 from semgrid_eval.runs.runner import run_matrix
+from semgrid_eval.runs.units import RunOptions
 from semgrid_eval.scores import results
 
 YAW_RATE_RADPS = 0.3
@@ -187,26 +186,6 @@ def test_without_logs_there_are_grids_alone(run, tmp_path):
         names = {channel.topic for channel in make_reader(stream).get_summary().channels.values()}
     assert {name.split("/")[1] for name in names} == {"grid", "tf"}
     assert len(played(written.log, "/tf")) == len(played(written.log, "/grid/target")) == 4
-
-
-def without_input_times(run, copy):
-    shutil.copytree(run, copy)
-    for path in copy.glob("results/*/result.json"):
-        value = json.loads(path.read_text())
-        for window in value["windows"]:
-            del window["input_stamps_ns"]
-        path.write_text(json.dumps(value))
-    return copy
-
-
-def test_results_without_times_of_inputs_take_them_from_the_logs(run, logs, tmp_path):
-    older = without_input_times(run, tmp_path / "run")
-    write_playback(run, "BL-DC", tmp_path / "new.mcap", logs=logs, every_recording=True)
-    write_playback(older, "BL-DC", tmp_path / "old.mcap", logs=logs, every_recording=True)
-    assert (tmp_path / "old.mcap").read_bytes() == (tmp_path / "new.mcap").read_bytes()
-    with pytest.raises(SemgridError, match="row BL-DC: its result keeps no times of inputs; add the logs"):
-        write_playback(older, "BL-DC", tmp_path / "none.mcap")
-    assert not (tmp_path / "none.mcap").exists()
 
 
 @pytest.mark.parametrize(

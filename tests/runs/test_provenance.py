@@ -3,7 +3,7 @@ import subprocess
 
 import pytest
 
-from semgrid_eval.runs.provenance import commit_of, versions
+from semgrid_eval.runs.record import commit_of, versions
 
 pytestmark = pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
 

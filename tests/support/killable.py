@@ -5,8 +5,8 @@ from pathlib import Path
 import torch
 
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.options import RunOptions
 from semgrid_eval.runs.runner import run_matrix
+from semgrid_eval.runs.units import RunOptions
 
 
 def run_here(matrix: str, logs: str, out: str) -> None:

@@ -6,8 +6,8 @@ from support.toy_world import street
 from semgrid_eval.executors import InProcess
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.options import RunOptions
 from semgrid_eval.runs.runner import run_matrix
+from semgrid_eval.runs.units import RunOptions
 
 WINDOW = {"step_frames": 3, "target_frame": 8}
 SPLITS = ("train", "train", "val", "val")

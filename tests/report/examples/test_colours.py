@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from semgrid_eval.classes import CLASS_NAMES, MASK_COLOUR, SAFE_COLOURS, class_palette
+from semgrid_eval.classes import CLASS_NAMES, MASK_COLOUR, class_palette
 from semgrid_eval.report.examples.drawing import CLASS_LEGEND, class_style
 
 # Machado, Oliveira and Fernandes 2009: linear sRGB as seen without one kind of cone.
@@ -39,4 +39,3 @@ def test_the_style_holds_both_palettes():
     assert "--class-1:#1c3353" in safe
     assert "--class-1:#804080" in paper
     assert [name for name, _ in CLASS_LEGEND] == [name.replace("_", " ") for name in CLASS_NAMES]
-    assert len(SAFE_COLOURS) == len(CLASS_NAMES)

@@ -2,16 +2,15 @@
 
 import torch
 
-from semgrid_eval.bench.material import random_windows
-from semgrid_eval.bench.textbook import prepare_window, train_by_the_book
+from semgrid_eval.bench.networks import prepare_window, random_windows, train_by_the_book
 from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
-from semgrid_eval.models.network import one_hot_planes
+from semgrid_eval.models.network import input_planes
 
 
 def test_a_window_prepared_by_itself_is_that_of_a_batch():
     windows = random_windows()
     batch = windows.batch(torch.tensor([0, 33, 79]))
-    planes = one_hot_planes(batch.past.flatten(1, 2), torch.float32)
+    planes = input_planes(batch.past)
     for row, index in enumerate((0, 33, 79)):
         inputs, target, mask = prepare_window(windows, index)
         assert torch.equal(inputs, planes[row])
