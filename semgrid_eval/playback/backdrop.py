@@ -1,8 +1,11 @@
-"""What a viewer wants to see of a log beside grids: pictures, their calibration, and where the vehicle is."""
+"""What a viewer wants beside grids: pictures, their calibration, where the vehicle is, and the layout of panels."""
 
 import heapq
-from collections.abc import Iterator
-from typing import NamedTuple
+import json
+import re
+from collections.abc import Iterator, Sequence
+from importlib import resources
+from typing import Any, NamedTuple
 
 from google.protobuf.message import Message
 
@@ -10,9 +13,10 @@ from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.reader import LogReader
-from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.log.topics import GRID_INPUT, GRID_PREDICTION, camera_topic
 from semgrid_eval.recording.png import read_header
 from semgrid_eval.recording.types import Pose
+from semgrid_eval.scores.results import RowRecord
 from semgrid_eval.sensors.camera import frame_poses
 
 _PICTURES = (topics.IMAGE, topics.LABEL)
@@ -38,7 +42,7 @@ class Backdrop:
 
     Raises:
         InputError: no camera leads the target.
-        LogError: the log is damaged, or has no such camera.
+        LogError: the log is damaged, or has no such camera, or later on no such frame.
     """
 
     def __init__(self, log: LogReader, grid: GridConfig) -> None:
@@ -51,21 +55,13 @@ class Backdrop:
         self._frames = {pose.stamp_ns: frame for frame, pose in enumerate(self.poses)}
 
     def frame_at(self, stamp_ns: int) -> int:
-        """Return the index of the frame of a time.
-
-        Raises:
-            LogError: there is none.
-        """
+        """Return the index of the frame of a time."""
         if stamp_ns not in self._frames:
             raise LogError(f"has no frame at {stamp_ns} ns", path=self._log.path)
         return self._frames[stamp_ns]
 
     def messages(self, first_ns: int, last_ns: int, *, shift_ns: int, grid_yaw_rad: float) -> Iterator[Outgoing]:
-        """Iterate over transforms, calibrations and pictures from `first_ns` to `last_ns`, all times shifted.
-
-        Raises:
-            LogError: what is read is damaged.
-        """
+        """Iterate over transforms, calibrations and pictures from `first_ns` to `last_ns`, all times shifted."""
         moving = self._transforms(first_ns, last_ns, shift_ns, grid_yaw_rad)
         return heapq.merge(moving, self._pictures(first_ns, last_ns, shift_ns), key=lambda sent: sent.log_ns)
 
@@ -98,3 +94,27 @@ class Backdrop:
         except InputError as error:
             raise LogError(str(error), path=self._log.path, field=topic) from error
         return header.width, header.height
+
+
+_TEMPLATE = "data/foxglove_layout.json"
+
+
+def viewer_layout(row: RowRecord, cameras: Sequence[str]) -> dict[str, Any]:
+    """Fill the template for a row and the first of the cameras; without a camera, the panels of pictures go."""
+    text = resources.files("semgrid_eval").joinpath(_TEMPLATE).read_text(encoding="utf-8")
+    text = text.replace("{prediction}", prediction_topic(row.name))
+    text = text.replace("{camera}", cameras[0] if cameras else "").replace("{row}", json.dumps(row.name)[1:-1])
+    layout: dict[str, Any] = json.loads(text)
+    shown = layout["configById"]["3D!input"]["topics"]
+    settings = shown.pop(f"{GRID_INPUT}/{{sensor}}")
+    shown.update({f"{GRID_INPUT}/{sensor}": settings for sensor in row.facts.sensors})
+    if not cameras:
+        panels = layout["configById"]
+        layout["configById"] = {name: panels[name] for name in panels if not name.startswith("Image!")}
+        layout["layout"] = layout["layout"]["second"]
+    return layout
+
+
+def prediction_topic(row_name: str) -> str:
+    """Return the topic of a row's predictions; characters that mean something to viewers become underscores."""
+    return f"{GRID_PREDICTION}/{re.sub(r'[^A-Za-z0-9_.-]', '_', row_name)}"

@@ -7,7 +7,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,24 +20,10 @@ from semgrid_eval.log.codec import transforms_message
 from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, GridPlace, exact_message, viewer_message
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.writer import MessageWriter
-from semgrid_eval.playback.backdrop import Backdrop, Outgoing
-from semgrid_eval.playback.layout import prediction_topic, viewer_layout
+from semgrid_eval.playback.backdrop import Backdrop, Outgoing, prediction_topic, viewer_layout
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.recording.types import Pose
-from semgrid_eval.scores.results import (
-    NOT_RUN,
-    PREDICTIONS_FILE,
-    ResultRecord,
-    RowRecord,
-    RunRecord,
-    WindowRecord,
-    read_predictions,
-    read_result,
-    read_run,
-    read_windows,
-    result_folder,
-    scored_digest,
-)
+from semgrid_eval.scores import results
 
 RECORD = "semgrid.playback"
 GAP_NS = 1_000_000_000
@@ -84,7 +69,7 @@ def write_playback(
     """
     if logs is not None and out.resolve().is_relative_to(logs.resolve()):
         raise InputError("lies in the folder of logs, where it would be taken for one", path=out)
-    record = read_run(run)
+    record = results.read_run(run)
     scored = _read_scored(run, _row(record, row_name, run))
     chosen = _choose(scored, recording, every_recording=every_recording)
     shifts_ns: dict[str, int] = {}  # what was added to each recording's times
@@ -97,22 +82,13 @@ def write_playback(
                 played = _Messages(scored, name, backdrop)
                 shift_ns = 0 if end_ns is None else end_ns + GAP_NS - played.first_ns
                 for sent in played.messages(shift_ns):
-                    writer.write(
-                        sent.topic, sent.message, log_ns=sent.log_ns, publish_ns=sent.publish_ns, notes=sent.notes
-                    )
+                    writer.write(**sent._asdict())
                 cameras = cameras if backdrop is None else backdrop.cameras
             shifts_ns[name], end_ns = shift_ns, played.last_ns + shift_ns
             progress(done, len(chosen), name)
-        writer.metadata(
-            RECORD,
-            {
-                "run": record.title,
-                "row": row_name,
-                "result": scored.record.id,
-                "seed": json.dumps(scored.record.seed),
-                "shift_ns": json.dumps(shifts_ns),
-            },
-        )
+        made = {"run": record.title, "row": row_name, "result": scored.record.id}
+        dumped = {"seed": json.dumps(scored.record.seed), "shift_ns": json.dumps(shifts_ns)}
+        writer.metadata(RECORD, made | dumped)
     layout = out.with_suffix(".layout.json")
     write_json(layout, viewer_layout(scored.row, cameras))
     return Playback(out, layout, tuple(chosen))
@@ -122,8 +98,8 @@ def write_playback(
 class _Scored:
     """A row's windows with one seed: inputs (N, S, T, H, W); target, mask, prediction and certainty (N, H, W)."""
 
-    row: RowRecord
-    record: ResultRecord
+    row: results.RowRecord
+    record: results.ResultRecord
     grid: GridConfig
     arrays: dict[str, NDArray[np.uint8]]
 
@@ -143,35 +119,29 @@ class _Scored:
         return GridPlace(spec.cell_m, spec.agent_row * spec.cell_m, spec.agent_column * spec.cell_m)
 
 
-def _row(record: RunRecord, name: str, run: Path) -> RowRecord:
+def _row(record: results.RunRecord, name: str, run: Path) -> results.RowRecord:
     row = next((row for row in record.rows if row.name == name), None)
     if row is None:
         raise InputError(f"there is no row {name!r}, only {_listed([row.name for row in record.rows])}", path=run)
     if not row.results:
-        raise InputError(f"it has no result: {row.failure or NOT_RUN}", path=run, field=f"row {name}")
+        raise InputError(f"it has no result: {row.failure or results.NOT_RUN}", path=run, field=f"row {name}")
     return row
 
 
-def _read_scored(run: Path, row: RowRecord) -> _Scored:
-    folders = [result_folder(run, result_id) for result_id in row.results]
-    folder = next((folder for folder in folders if (folder / PREDICTIONS_FILE).is_file()), None)
+def _read_scored(run: Path, row: results.RowRecord) -> _Scored:
+    folders = [results.result_folder(run, result_id) for result_id in row.results]
+    folder = next((folder for folder in folders if (folder / results.PREDICTIONS_FILE).is_file()), None)
     if folder is None:
         raise InputError("none of its results kept its predictions", path=run, field=f"row {row.name}")
-    record = read_result(folder)
+    record = results.read_result(folder)
     grid = parse_config(GridConfig, record.config.get("grid"), path=folder / "result.json")
-    arrays = read_predictions(folder) | read_windows(run, record.windows_id)
-    _check_shapes(arrays, record, row, grid, folder)
-    return _Scored(row, record, grid, {name: array.astype(np.uint8) for name, array in arrays.items()})
-
-
-def _check_shapes(
-    arrays: dict[str, NDArray[Any]], record: ResultRecord, row: RowRecord, grid: GridConfig, folder: Path
-) -> None:
+    arrays = results.read_predictions(folder) | results.read_windows(run, record.windows_id)
     flat = (len(record.windows), grid.spec.rows, grid.spec.columns)
     for name, array in arrays.items():
         expected = (flat[0], len(row.facts.sensors), row.facts.inputs, *flat[1:]) if name == "inputs" else flat
         if array.shape != expected:
             raise ResultError(f"has shape {array.shape}, not {expected}", path=folder, field=name)
+    return _Scored(row, record, grid, {name: array.astype(np.uint8) for name, array in arrays.items()})
 
 
 def _choose(scored: _Scored, recording: str | None, *, every_recording: bool) -> list[str]:
@@ -181,9 +151,8 @@ def _choose(scored: _Scored, recording: str | None, *, every_recording: bool) ->
     if recording is None:
         return names[:1]
     if recording not in names:
-        raise InputError(
-            f"there is no scored recording {recording!r}, only {_listed(names)}", field=f"row {scored.row.name}"
-        )
+        fault = f"there is no scored recording {recording!r}, only {_listed(names)}"
+        raise InputError(fault, field=f"row {scored.row.name}")
     return [recording]
 
 
@@ -192,12 +161,12 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:_LISTED_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def _open_backdrop(record: RunRecord, scored: _Scored, name: str, logs: Path, stack: ExitStack) -> Backdrop:
+def _open_backdrop(record: results.RunRecord, scored: _Scored, name: str, logs: Path, stack: ExitStack) -> Backdrop:
     if not logs.is_dir():
         raise InputError("is not a folder", path=logs)
     path = scored.record.windows[scored.windows_of[name][0]].log
     log = stack.enter_context(LogReader(logs / path))
-    known = scored_digest(record, scored.record, path)
+    known = results.scored_digest(record, scored.record, path)
     if log.digest not in (scored.record.log_digests if known is None else (known,)):
         raise LogError(f"has digest {log.digest}, and the log that was scored had {known or 'another'}", path=log.path)
     return Backdrop(log, scored.grid)
@@ -220,8 +189,7 @@ class _Messages:
 
     def messages(self, shift_ns: int) -> Iterator[Outgoing]:
         """Iterate over all messages in the order of time, all times shifted."""
-        around = self._around(shift_ns)
-        return heapq.merge(around, self._grids(shift_ns), key=lambda sent: sent.log_ns)
+        return heapq.merge(self._around(shift_ns), self._grids(shift_ns), key=lambda sent: sent.log_ns)
 
     def _around(self, shift_ns: int) -> Iterator[Outgoing]:
         if self._backdrop is None:  # nothing is known of the vehicle's way: each grid lies where the last one did
@@ -245,7 +213,9 @@ class _Messages:
                     exact = exact_message(now_ns, values, layer, place)
                     yield Outgoing(now_ns, f"{topic}/exact", exact, publish_ns, notes)
 
-    def _layers(self, index: int, window: WindowRecord) -> Iterator[tuple[str, NDArray[np.uint8], GridLayer, int]]:
+    def _layers(
+        self, index: int, window: results.WindowRecord
+    ) -> Iterator[tuple[str, NDArray[np.uint8], GridLayer, int]]:
         """Return topic, values (H, W), their meaning and since when they could be known, of each grid of a window."""
         arrays, row, inputs_ns = self._scored.arrays, self._scored.row, window.input_stamps_ns
         for sensor, past in zip(row.facts.sensors, arrays["inputs"][index], strict=True):

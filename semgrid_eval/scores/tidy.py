@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from semgrid_eval.scores.metrics.metric import Metric, column_names
+from semgrid_eval.scores.metrics.metric import Metric, Partition, column_names
 from semgrid_eval.scores.metrics.table import METRICS
-from semgrid_eval.scores.regions.partition import Partition
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.results import ResultRecord, read_result, read_run, read_sums, result_folder
 

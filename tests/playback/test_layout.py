@@ -3,7 +3,7 @@ import re
 import pytest
 from support.fake_run import facts
 
-from semgrid_eval.playback.layout import prediction_topic, viewer_layout
+from semgrid_eval.playback.backdrop import prediction_topic, viewer_layout
 from semgrid_eval.scores.results import RowRecord
 
 

@@ -1,5 +1,6 @@
 """A plausible run folder, made in a second or two from nothing: streets, shifted inputs and imperfect predictors."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import MOVING, STANDING, GridSpec
-from semgrid_eval.report.rows.load import Result, Row, SumsReader
+from semgrid_eval.report.rows.load import Result, Row
 from semgrid_eval.scores import results
 from semgrid_eval.scores.metrics.metric import ScoredWindows
 from semgrid_eval.scores.metrics.table import count_windows
@@ -151,7 +152,7 @@ def counted_row(
     return Row(name, row, (Result(record, reader(sums), None, Path()),), (), Path())
 
 
-def reader(sums: dict[tuple[str, str], NDArray[np.int32]]) -> SumsReader:
+def reader(sums: dict[tuple[str, str], NDArray[np.int32]]) -> Callable[[str, str], NDArray | None]:
     """Let a result have its sums in memory."""
     return lambda metric, partition: sums.get((metric, partition))
 

@@ -9,20 +9,10 @@ import numpy as np
 import pandas as pd
 
 from semgrid_eval.report.claims.claims import MARGIN, WINDOW_MS, Check, Claim, Rule, claims
-from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores, Scores, weighted_sum
+from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, Scores, weighted_sum
 from semgrid_eval.report.rows.load import Run
-from semgrid_eval.report.tables.table import (
-    ABSENT,
-    MINUS,
-    Cell,
-    Line,
-    Table,
-    difference_cell,
-    finite,
-    interval_phrase,
-    plain_table,
-    plural,
-)
+from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, plural
+from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, plain_table
 
 TRUTH = "logs that tell where true actors move"
 SAME_TARGETS = "rows with the same targets"
@@ -72,7 +62,10 @@ def find(runs: Sequence[Run], scores: Scores, regions: Mapping[str, Scores]) -> 
     """Test every claim on every run, from the scores of all cells and of those near moving and standing actors."""
     found = []
     for run in runs:
-        places = {name: _by_record(each, run) for name, each in {"": scores, **regions}.items()}
+        places = {  # rows by their names in the matrix, which the claims go by
+            region: {entry.row.record.name: entry for entry in of.values() if entry.row.run == run.folder}
+            for region, of in {"": scores, **regions}.items()
+        }
         for claim in claims(places[""]):
             found.append(Finding(run.tag, claim, tuple(_outcome(check, places) for check in claim.checks)))
     return found
@@ -139,11 +132,6 @@ def _head(finding: Finding) -> dict[str, Any]:
 
 def _tag(findings: Sequence[Finding]) -> str:
     return next((f" ({each.run})" for each in findings if each.run), "")
-
-
-def _by_record(scores: Scores, run: Run) -> dict[str, RowScores]:
-    """Find a run's rows by their names in its matrix, which the claims go by."""
-    return {entry.row.record.name: entry for entry in scores.values() if entry.row.run == run.folder}
 
 
 def _outcome(check: Check, places: Mapping[str, Scores]) -> Outcome:

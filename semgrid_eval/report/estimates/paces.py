@@ -1,4 +1,4 @@
-"""Windows by how fast the vehicle drives between the newest input and the target.
+"""The divisions that every metric is reported by; among them, windows by how fast the vehicle drives.
 
 Who stands needs no alignment, who drives fast needs it most: whether a model has learned the motion shows here.
 """
@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.report.estimates.division import Division, of_windows
+from semgrid_eval.report.estimates.division import Division, of_cells, of_windows
 from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import Result, Row, Run
+from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.thumbnails import Track
 
 EDGES_MPS = (0.5, 4.0, 8.0)
@@ -49,3 +50,8 @@ def _paces(result: Result, kept: RunThumbnails) -> NDArray[np.int64]:
             speed_mps = mean_speed_mps(track, window.input_stamps_ns[-1], window.target_stamp_ns)
             found[i] = np.digitize(speed_mps, EDGES_MPS)
     return found
+
+
+def divisions(runs: Sequence[Run]) -> list[Division]:
+    """Return the divisions of cells, all cells first, and then those of windows."""
+    return [*map(of_cells, PARTITIONS.values()), paces(runs)]  # to add kinds of windows, add them here

@@ -12,18 +12,15 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_NAMES, KNOWN_IDS
 from semgrid_eval.report.rows.load import Result, Row, comparable, key_of
-from semgrid_eval.report.rows.pairing import Headline, reference_of
-from semgrid_eval.report.rows.settings import settings_but
+from semgrid_eval.report.rows.pairing import Headline, reference_of, settings_but
 from semgrid_eval.scores.metrics.iou import class_iou
-from semgrid_eval.scores.metrics.metric import mean_finite
+from semgrid_eval.scores.metrics.metric import Floats, mean_finite
 from semgrid_eval.scores.results import WindowRecord
 
 MIN_CELLS = 10
 """A class counts in the choice of windows only where the target has at least this many of its cells."""
 
 _MOST_RIVALS = 2
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -114,7 +111,7 @@ def mean_iou(result: Result, window: WindowRecord) -> float:
     return float(mean_finite(values[0, KNOWN_IDS]))
 
 
-def rule_values(contest: Contest) -> Array:
+def rule_values(contest: Contest) -> Floats:
     """Evaluate the rule for each window and class: (N, C); NaN where there is too little of the class."""
     counts = contest.result.counts
     mine = class_iou(counts.astype(np.int64))
@@ -123,7 +120,7 @@ def rule_values(contest: Contest) -> Array:
     return np.where(few, np.nan, np.minimum.reduce(gaps))
 
 
-def _aligned_iou(result: Result, other: Result) -> Array:
+def _aligned_iou(result: Result, other: Result) -> Floats:
     """IoU of another result's windows in the order of `result`; NaN where it has no such window."""
     theirs = class_iou(other.counts.astype(np.int64))
     places = np.array([other.places.get(key_of(window), -1) for window in result.record.windows], np.intp)
@@ -149,7 +146,7 @@ def _looking_further(main: Row, rows: Sequence[Row]) -> list[Row]:
     return sorted(alike, key=lambda row: row.record.facts.horizon_steps)
 
 
-def _ordered(values: Array) -> NDArray[np.intp]:
+def _ordered(values: Floats) -> NDArray[np.intp]:
     """Order the windows that have a value, largest first, ties in the order of the windows."""
     order = np.argsort(-values, kind="stable")
     return order[np.isfinite(values[order])]

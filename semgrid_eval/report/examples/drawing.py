@@ -13,6 +13,7 @@ from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, MASK_COLOUR, NO_POINT
 from semgrid_eval.recording.png import decode_ids
 
 Grid = NDArray[np.uint8]
+PictureKind = Literal["camera", "labels", "grid"]
 
 MASKED, POINTLESS, HATCHED = CLASS_COUNT, CLASS_COUNT + 1, CLASS_COUNT + 2
 POINTLESS_COLOUR = (226, 232, 240)
@@ -45,7 +46,7 @@ class Picture:
     title: str
     alt: str  # what it shows
     uri: str
-    kind: Literal["camera", "labels", "grid"] = "grid"
+    kind: PictureKind = "grid"
     lead: bool = True  # whether it is the one to show large
     colours: frozenset[int] = frozenset()  # which of `LEGEND` appear in it
 
@@ -55,7 +56,7 @@ def grid_picture(
 ) -> Picture:
     """Draw a grid (H, W) in the colour-blind-safe class colours, which a page's reader may switch, mask M in white."""
     shown = grid if mask is None else np.where(mask, MASKED, grid).astype(np.uint8)
-    return Picture(title, alt, data_uri(_png(shown, _class_palette())), lead=lead, colours=_colours(shown))
+    return _class_picture(title, alt, shown, lead=lead)
 
 
 def label_picture(title: str, alt: str, label: bytes, class_by_label: Grid) -> Picture:
@@ -66,7 +67,7 @@ def label_picture(title: str, alt: str, label: bytes, class_by_label: Grid) -> P
     """
     classes = class_by_label[decode_ids(label)]
     shown = np.where(classes == NO_POINT, POINTLESS, classes).astype(np.uint8)
-    return Picture(title, alt, data_uri(_png(shown, _class_palette())), "labels", colours=_colours(shown))
+    return _class_picture(title, alt, shown, "labels")
 
 
 def hatch_png(cells: NDArray[np.bool_]) -> bytes:
@@ -100,12 +101,9 @@ def data_uri(content: bytes, kind: str = "image/png") -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
-def _colours(shown: Grid) -> frozenset[int]:
-    return frozenset(np.unique(shown).tolist())
-
-
-def _class_palette() -> Grid:
-    return np.vstack([class_palette(safe=True), np.array([MASK_COLOUR, POINTLESS_COLOUR], np.uint8)])
+def _class_picture(title: str, alt: str, shown: Grid, kind: PictureKind = "grid", *, lead: bool = True) -> Picture:
+    palette = np.vstack([class_palette(safe=True), np.array([MASK_COLOUR, POINTLESS_COLOUR], np.uint8)])
+    return Picture(title, alt, data_uri(_png(shown, palette)), kind, lead, frozenset(np.unique(shown).tolist()))
 
 
 def _png(indices: Grid, palette: NDArray[np.uint8], *, bits: int = 4, clear: int | None = None) -> bytes:

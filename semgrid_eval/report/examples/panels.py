@@ -6,21 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.report.examples.camera import Crop, View
+from semgrid_eval.report.examples import drawing
 from semgrid_eval.report.examples.choose import Contest, Pick, by_window, mean_iou
-from semgrid_eval.report.examples.drawing import (
-    HATCHED,
-    LEGEND,
-    Grid,
-    Picture,
-    certainty_png,
-    data_uri,
-    grid_picture,
-    right_png,
-)
-from semgrid_eval.report.examples.thumbnails import RunThumbnails, times
+from semgrid_eval.report.examples.thumbnails import Crop, RunThumbnails, View, times
 from semgrid_eval.report.rows.load import Row, WindowReader, key_of
-from semgrid_eval.report.tables.table import ABSENT, number, plural, signed
+from semgrid_eval.report.tables.numbers import ABSENT, number, plural, signed
 from semgrid_eval.scores.results import WindowRecord, read_predictions, read_windows
 
 _FEWEST_COLUMNS, _MOST_COLUMNS = 4, 6
@@ -32,7 +22,7 @@ class Column:
 
     title: str
     note: str
-    pictures: tuple[Picture, ...]
+    pictures: tuple[drawing.Picture, ...]
     step: bool = True  # whether it belongs to the way from the inputs over the target to the prediction
 
     @property
@@ -81,7 +71,7 @@ class Shown:
         """Return the inputs and the target; where the contest is about horizons, each row's newest input and answer."""
         yield from self._horizons(i, view) if self.contest.baselines else self._inputs(i, view)
         seen = self._seen[self.contest.model.name][i]
-        target = grid_picture("Target", "Target grid with mask M in white", seen["target"], seen["mask"] > 0)
+        target = drawing.grid_picture("Target", "Target grid with mask M in white", seen["target"], seen["mask"] > 0)
         photos = view.photos(view.window.target_stamp_ns, "at the target's time")
         yield Column("Target", "to be predicted", (*photos, target))
 
@@ -97,12 +87,13 @@ class Shown:
             yield self._answer(row, i, step=False)
         for row in there[:1]:
             alt, theirs = f"Cells where {model.name} or {row.name} is right", self._answers[row.name][i]
-            right = right_png(seen["target"], mine["prediction"], theirs["prediction"], seen["mask"] > 0)
-            yield Column("Who is right", "cell by cell", (Picture("", alt, data_uri(right)),), step=False)
+            right = drawing.right_png(seen["target"], mine["prediction"], theirs["prediction"], seen["mask"] > 0)
+            picture = drawing.Picture("", alt, drawing.data_uri(right))
+            yield Column("Who is right", "cell by cell", (picture,), step=False)
         certainty = mine["certainty"]
         if certainty.min() < certainty.max():  # a baseline is equally certain of everything
             alt = f"Certainty of {model.name}, light is certain"
-            picture = Picture("", alt, data_uri(certainty_png(certainty)))
+            picture = drawing.Picture("", alt, drawing.data_uri(drawing.certainty_png(certainty)))
             yield Column("Certainty", "light is certain", (picture,), step=False)
 
     def _inputs(self, i: int, view: View) -> Iterator[Column]:
@@ -135,14 +126,15 @@ class Shown:
     def _answer(self, row: Row, i: int, *, step: bool) -> Column:
         return Column(row.name, self._iou(row, i).removeprefix(", "), (self._prediction(row, i, ""),), step)
 
-    def _prediction(self, row: Row, i: int, title: str, *, lead: bool = True) -> Picture:
-        return grid_picture(title, f"Prediction of {row.name}", self._answers[row.name][i]["prediction"], lead=lead)
+    def _prediction(self, row: Row, i: int, title: str, *, lead: bool = True) -> drawing.Picture:
+        grid = self._answers[row.name][i]["prediction"]
+        return drawing.grid_picture(title, f"Prediction of {row.name}", grid, lead=lead)
 
     def _iou(self, row: Row, i: int) -> str:
         value = number(mean_iou(row.shown, self._windows[i]))
         return "" if value == ABSENT else f", mean IoU {value}"
 
-    def _of(self, row: Row, arrays: Mapping[str, NDArray[np.generic]]) -> dict[int, dict[str, Grid]]:
+    def _of(self, row: Row, arrays: Mapping[str, NDArray[np.generic]]) -> dict[int, dict[str, drawing.Grid]]:
         """Copy what arrays hold of the windows that a row has, so that the rest need not be kept."""
         places, found = row.shown.places, {}
         for i, window in self._windows.items():
@@ -168,12 +160,12 @@ def draw_examples(shown: Shown, picks: Sequence[Pick], thumbnails: RunThumbnails
             command=thumbnails.command(contest.model, window),
             film=film,
             answers=answers,
-            legend=tuple(LEGEND[i] for i in sorted(colours | ({HATCHED} if hatching else set()))),
+            legend=tuple(drawing.LEGEND[i] for i in sorted(colours | ({drawing.HATCHED} if hatching else set()))),
             crops=() if kept is None else view.crops,
             hatching=hatching,
         )
 
 
-def _input_picture(grid: Grid, title: str, sensor: str, *, lead: bool = True) -> Picture:
+def _input_picture(grid: drawing.Grid, title: str, sensor: str, *, lead: bool = True) -> drawing.Picture:
     name = f"{title}, {sensor}" if sensor else title
-    return grid_picture(sensor or "Newest input", f"{name}, aligned to the target", grid, lead=lead)
+    return drawing.grid_picture(sensor or "Newest input", f"{name}, aligned to the target", grid, lead=lead)

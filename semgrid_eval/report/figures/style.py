@@ -11,10 +11,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from semgrid_eval.report.claims.paper import in_paper
+from semgrid_eval.report.claims.claims import in_paper
 from semgrid_eval.report.estimates.bootstrap import Scores
 from semgrid_eval.report.rows.load import Row
-from semgrid_eval.report.tables.table import plural
+from semgrid_eval.report.tables.numbers import plural
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart.
 PALETTE = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")

@@ -1,22 +1,22 @@
-"""Where a report's numbers come from: failures, logs, results, versions and the commands that made them."""
+"""Where a report's numbers come from: failures, logs, results, versions, and commands to make and play them again."""
 
+import shlex
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import pandas as pd
 import yaml
 
 from semgrid_eval.files import digest_value
-from semgrid_eval.report.claims.paper import scaling
-from semgrid_eval.report.page.commands import row_command
+from semgrid_eval.report.claims.claims import scaling
 from semgrid_eval.report.rows.load import Row, Run
-from semgrid_eval.report.tables.table import Cell, Line, Table, plain_table, plural
+from semgrid_eval.report.tables.numbers import plural
+from semgrid_eval.report.tables.table import Cell, Line, Table, plain_table
 from semgrid_eval.scores.results import NOT_RUN, LogRecord, ResultRecord, RunRecord
 from semgrid_eval.sources.benchmarks import FINGERPRINT_CHARACTERS, published_fingerprints
-
-WINDOW_COLUMNS = ("window_set", "recording", "log", "target_frame", "target_stamp_ns", "input_stamps_ns")
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,8 @@ def window_frame(runs: Sequence[Run]) -> pd.DataFrame:
         for name, record in {record.windows_id: record for record in results}.items()
         for w in record.windows
     ]
-    return pd.DataFrame(lines, columns=list(WINDOW_COLUMNS))
+    columns = ["window_set", "recording", "log", "target_frame", "target_stamp_ns", "input_stamps_ns"]
+    return pd.DataFrame(lines, columns=columns)
 
 
 def _state(row: Row) -> str:
@@ -161,3 +162,32 @@ def duration(seconds: float) -> str:
 
 def _seconds(value: float | None) -> Cell:
     return Cell("none") if value is None else Cell(f"{value:.1f} s", value)
+
+
+def row_command(command: str, row: str, matrix: str) -> str:
+    """Return the command line that makes one row: the run's own, narrowed to it, or one that reads the matrix file."""
+    words = _words(command) or ["semgrid-eval", "run", matrix, "--logs", "LOGS", "--out", "RUN"]
+    kept, skip = [], False
+    for word in words:
+        if not skip and word != "--row" and not word.startswith("--row="):
+            kept.append(word)
+        skip = not skip and word == "--row"
+    return shlex.join([*kept, "--row", row])
+
+
+def play_command(command: str, row: str, recording: str) -> str:
+    """Return the command line that plays a recording of a row, with the folders that the run's own names."""
+    spread = [part for word in _words(command) for part in (word.split("=", 1) if word.startswith("--") else [word])]
+    found = {name: value for name, value in pairwise(spread) if name.startswith("--")}
+    logs = found.get("--validation-logs", found.get("--logs", "LOGS"))
+    where = [found.get("--out", "RUN"), row, "--logs", logs]
+    return shlex.join(["semgrid-eval", "play", *where, "--recording", recording, "--out", "play.mcap"])
+
+
+def _words(command: str) -> list[str]:
+    """Split a run's command line as a shell does; empty where it is none."""
+    try:
+        words = shlex.split(command)
+    except ValueError:  # it was not written by a shell's rules
+        return []
+    return words if words[:2] == ["semgrid-eval", "run"] else []

@@ -7,7 +7,7 @@ from math import isfinite
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, Scores
 from semgrid_eval.report.rows.load import Row, Run, key_of
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, Headline, verdict
-from semgrid_eval.report.tables.table import MINUS, interval, interval_phrase, number, plural, signed
+from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, plural, signed
 
 _FEW_RECORDINGS, _FEW_SEEDS = 10, 5
 _WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}

@@ -11,20 +11,17 @@ from semgrid_eval import __version__
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_folder
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.report.claims.claims import MARGIN
+from semgrid_eval.report.claims.claims import MARGIN, in_paper
 from semgrid_eval.report.claims.findings import Finding, finding_table, missing_table, sentence
-from semgrid_eval.report.claims.paper import in_paper
-from semgrid_eval.report.estimates.bootstrap import Parts, Scores
+from semgrid_eval.report.estimates.bootstrap import Level, Parts, Resampling, Scores
 from semgrid_eval.report.estimates.paces import EDGES_MPS
-from semgrid_eval.report.estimates.resampling import Level, Resampling
 from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, class_style, data_uri
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
-from semgrid_eval.report.page import provenance
-from semgrid_eval.report.page.material import Material, gather
+from semgrid_eval.report.page import exports, provenance
+from semgrid_eval.report.page.exports import Material, gather
 from semgrid_eval.report.page.summary import summarise
 from semgrid_eval.report.rows.load import Row, load_runs
 from semgrid_eval.report.rows.pairing import Headline, headline
-from semgrid_eval.report.tables import write as exports
 from semgrid_eval.report.tables.scores import confusion_table
 from semgrid_eval.report.tables.table import Table
 
@@ -54,7 +51,7 @@ def write_report(
     material = gather(load_runs(folders, progress=progress), Resampling(_SEED, level=resample))
     with atomic_folder(out) as folder:
         exports.write_numbers(folder, material)
-        exports.write_tables(folder, material.all_tables)
+        exports.write_tables(folder, material)
         exports.write_figures(folder, material.figures)
         (folder / PAGE).write_text(render_page(material), encoding="utf-8")
     return out / PAGE

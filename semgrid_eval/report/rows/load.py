@@ -15,34 +15,18 @@ from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, SemgridError
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.scores.results import (
-    NOT_RUN,
-    PREDICTIONS_FILE,
-    ResultRecord,
-    RowRecord,
-    RunRecord,
-    WindowRecord,
-    check_sums,
-    read_history,
-    read_result,
-    read_run,
-    read_sums,
-    result_folder,
-)
+from semgrid_eval.scores import results as files
 
 WindowReader = Callable[[Path, str], Mapping[str, NDArray[Any]]]
 """Reads a set of windows, as `scores.results.read_windows` does, from a run by its id."""
-
-SumsReader = Callable[[str, str], NDArray[np.int32] | None]
-"""Reads what a metric counted by a partition, as `scores.results.read_sums` does from a result's folder."""
 
 
 @dataclass(frozen=True)
 class Result:
     """One readable result: its record, its training history, and its sums, which are read when asked for."""
 
-    record: ResultRecord
-    read: SumsReader
+    record: files.ResultRecord
+    read: Callable[[str, str], NDArray[np.int32] | None]  # what a metric counted by a partition, as `read_sums` does
     history: pd.DataFrame | None
     folder: Path
 
@@ -88,7 +72,7 @@ class Row:
     """One row of the matrix with its readable results, in the order of its record, and what went wrong."""
 
     name: str  # unique in the report: the record's name, with its run's tag where there are several runs
-    record: RowRecord
+    record: files.RowRecord
     results: tuple[Result, ...]
     failures: tuple[str, ...]
     run: Path
@@ -118,7 +102,7 @@ class Row:
     @property
     def shown(self) -> Result:
         """The result to show pictures of: the first one that kept its predictions."""
-        kept = (result for result in self.results if (result.folder / PREDICTIONS_FILE).is_file())
+        kept = (result for result in self.results if (result.folder / files.PREDICTIONS_FILE).is_file())
         return next(kept, self.results[0])
 
     @property
@@ -143,7 +127,7 @@ class Run:
 
     folder: Path
     tag: str  # tells runs apart; empty where there is only one
-    record: RunRecord
+    record: files.RunRecord
     rows: tuple[Row, ...]
 
 
@@ -153,7 +137,7 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
     Raises:
         InputError: a run's record is missing or malformed. Faulty results are failures of their rows instead.
     """
-    records = [read_run(folder) for folder in folders]
+    records = [files.read_run(folder) for folder in folders]
     total, done, runs = sum(len(record.rows) for record in records), count(1), []
     for folder, tag, record in zip(folders, _tags(folders), records, strict=True):
         rows, load = [], _Loader(folder, {log.path: log.group for log in record.logs})
@@ -169,7 +153,7 @@ def comparable(row: Row, other: Row) -> bool:
     return row.targets == other.targets != ""
 
 
-def key_of(window: WindowRecord) -> tuple[str, int]:
+def key_of(window: files.WindowRecord) -> tuple[str, int]:
     """Identify the target frame of a window across rows."""
     return window.recording, window.target_stamp_ns
 
@@ -195,14 +179,14 @@ class _Loader:
 
     def __init__(self, run: Path, groups: Mapping[str, str]) -> None:
         self._run, self._groups = run, groups
-        self._windows: dict[tuple[WindowRecord, ...], tuple[WindowRecord, ...]] = {}
+        self._windows: dict[tuple[files.WindowRecord, ...], tuple[files.WindowRecord, ...]] = {}
 
-    def row(self, row: RowRecord, name: str) -> Row:
-        failures = [] if row.failure in (None, NOT_RUN) else [row.failure]
+    def row(self, row: files.RowRecord, name: str) -> Row:
+        failures = [] if row.failure in (None, files.NOT_RUN) else [row.failure]
         found = []
         for result_id in row.results:
             try:
-                found.append(self._result(result_folder(self._run, result_id)))
+                found.append(self._result(files.result_folder(self._run, result_id)))
             except (SemgridError, OSError, ValueError) as error:
                 failures.append(str(error))
         if not row.results and row.failure is None:
@@ -212,8 +196,8 @@ class _Loader:
         return Row(name, row, tuple(found), tuple(failures), self._run, self._groups)
 
     def _result(self, folder: Path) -> Result:
-        record = read_result(folder)
+        record = files.read_result(folder)
         windows = self._windows.setdefault(record.windows, record.windows)
-        check_sums(folder, len(windows))
+        files.check_sums(folder, len(windows))
         shared = record.model_copy(update={"windows": windows})
-        return Result(shared, partial(read_sums, folder), read_history(folder), folder)
+        return Result(shared, partial(files.read_sums, folder), files.read_history(folder), folder)

@@ -1,6 +1,6 @@
-"""Which row is compared with which: by what rows are and by the targets of their results, never by their names."""
+"""Which row is compared with which, by what rows are and by their targets, never by names; and how settings differ."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,8 @@ from semgrid_eval.report.rows.load import Row, comparable, key_of
 
 HEADLINE = "mean_known"
 DIFFERENCE_COLUMNS = ("static_known", "small_static", "vehicles", "small_dynamic", HEADLINE)
+_UNSET = "not set"
+_OF_TARGETS = ("grid.", "window.", "validation_window", "validation_split", "mask_mode")
 
 
 @dataclass(frozen=True)
@@ -76,9 +78,7 @@ def shared_windows(row: Row, other: Row) -> int:
 
 def verdict(difference: Estimate) -> str:
     """Put a difference into one word: gain, loss or open (the interval includes zero, or there is none)."""
-    if not difference.sure:
-        return "open"
-    return "gain" if difference.value > 0 else "loss"
+    return "gain" if difference.low > 0 else "loss" if difference.high < 0 else "open"
 
 
 def _frames_ahead(row: Row) -> int:
@@ -90,3 +90,32 @@ def _nearness(row: Row, other: Row) -> tuple[bool, ...]:
     mine, theirs = row.record.facts, other.record.facts
     shared = (mine.sensors == theirs.sensors, mine.translate == theirs.translate, mine.inputs == theirs.inputs)
     return (*shared, mine.step_frames == theirs.step_frames, not theirs.learns)
+
+
+def settings_of(row: Row) -> Mapping[str, object]:
+    """Return all that determined a row's numbers, nested settings under dotted names."""
+    return row.results[0].settings
+
+
+def changed_settings(before: Mapping[str, object], after: Mapping[str, object]) -> dict[str, str]:
+    """Say in words which flat settings differ, by key: `mask_mode exclude to off`."""
+    keys = [*before, *(key for key in after if key not in before)]
+    pairs = [(key, before.get(key, _UNSET), after.get(key, _UNSET)) for key in keys]
+    return {key: f"{key} {_text(first)} to {_text(second)}" for key, first, second in pairs if first != second}
+
+
+def changed_targets(before: Mapping[str, object], after: Mapping[str, object]) -> list[str]:
+    """Say which of the settings that differ decide what the targets are."""
+    return [text for key, text in changed_settings(before, after).items() if key.startswith(_OF_TARGETS)]
+
+
+def settings_but(row: Row, *left_out: str) -> tuple[tuple[str, str], ...]:
+    """Return a row's settings, to compare and to group by, without those whose last part is `left_out`."""
+    kept = {key: value for key, value in settings_of(row).items() if key.rpartition(".")[2] not in left_out}
+    return tuple(sorted((key, repr(value)) for key, value in kept.items()))
+
+
+def _text(value: object) -> str:
+    if isinstance(value, list):
+        return ", ".join(str(part) for part in value)
+    return "none" if value is None else str(value).lower() if isinstance(value, bool) else str(value)

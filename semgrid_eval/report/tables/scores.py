@@ -1,4 +1,4 @@
-"""The page's tables of scores: of all cells, of every metric in every division, of confusions, and of costs."""
+"""The page's tables: scores, confusions and costs, what each row changes, and what cannot be compared at all."""
 
 from collections.abc import Sequence
 
@@ -7,13 +7,20 @@ import numpy as np
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.estimates.bootstrap import LABELS, Everything, Parts, RowScores, Scores
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
-from semgrid_eval.report.rows.load import Result
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS
-from semgrid_eval.report.tables.changes import changes_table, not_compared_table
-from semgrid_eval.report.tables.table import ABSENT, Cell, Line, Table, plain_cell, plain_table, plural
-from semgrid_eval.report.tables.values import difference_table, run_differences, seeds, side_by_side, value_table
+from semgrid_eval.report.rows.load import Row, comparable
+from semgrid_eval.report.rows.pairing import (
+    DIFFERENCE_COLUMNS,
+    changed_settings,
+    changed_targets,
+    main_group,
+    settings_of,
+    shared_windows,
+)
+from semgrid_eval.report.tables.numbers import ABSENT, MINUS, interval_phrase, number, plural
+from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, plain_table
+from semgrid_eval.report.tables.values import difference_table, run_differences, side_by_side, value_table
 from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS, MERGED_COLUMNS
-from semgrid_eval.scores.metrics.metric import Floats, Metric, divided
+from semgrid_eval.scores.metrics.metric import Metric, divided
 from semgrid_eval.scores.metrics.table import IOU, METRICS
 
 _PAPER = (
@@ -30,7 +37,7 @@ _MERGED = (
 
 def score_tables(scores: Scores, tags: Sequence[str]) -> dict[str, Table | None]:
     """Make the page's tables of IoU over all cells; one with nothing to show is None or has no lines."""
-    first = tags[0] if tags else "the first run"
+    in_runs = f"The same rows in several runs: differences to {tags[0] if tags else 'the first run'}."
     return {
         "categories": value_table("categories", _CATEGORIES, scores, CATEGORY_COLUMNS, beside_paper=True),
         "differences": difference_table("differences", _to_baseline("category"), scores, DIFFERENCE_COLUMNS),
@@ -39,37 +46,9 @@ def score_tables(scores: Scores, tags: Sequence[str]) -> dict[str, Table | None]
         "changes": changes_table(scores),
         "not_compared": not_compared_table(scores),
         "merged": value_table("merged", _MERGED, scores, MERGED_COLUMNS),
-        "windows": window_means(scores),
-        "runs": run_differences(
-            "runs", f"The same rows in several runs: differences to {first}.", scores, DIFFERENCE_COLUMNS
-        ),
+        "runs": run_differences("runs", in_runs, scores, DIFFERENCE_COLUMNS),
         "costs": cost_table(list(scores.values())),
     }
-
-
-def window_means(scores: Scores) -> Table:
-    """Show the mean over windows of each window's own scores, where the other tables pool their counts."""
-    lines = [Line(name, _window_cells(entry)) for name, entry in scores.items()]
-    caption = "Mean over windows of each window's own category scores; windows without a category are left out."
-    return plain_table("windows", caption, "Row", [LABELS[column] for column in CATEGORY_COLUMNS], lines)
-
-
-def _window_cells(entry: RowScores) -> tuple[Cell, ...]:
-    at = [list(LABELS).index(column) for column in CATEGORY_COLUMNS]
-    total, number = np.zeros((2, len(at)))
-    for result in entry.results:
-        values = _window_figures(entry.metric, result)[:, at]
-        total, number = total + np.nansum(values, axis=0), number + np.isfinite(values).sum(axis=0)
-    texts = [f"{entry.row.name}: {plural(int(n), 'window score')}, all seeds together; {seeds(entry)}" for n in number]
-    means = divided(total, number.astype(np.int64)).tolist()
-    return tuple(plain_cell(mean, title=text) for mean, text in zip(means, texts, strict=True))
-
-
-def _window_figures(metric: Metric, result: Result) -> Floats:
-    """Return the figures (N, Q) of each window alone, without keeping what they come from."""
-    counts = result.read(metric.name, "all")
-    assert counts is not None  # all cells are always counted
-    return metric.figures(metric.ratios(counts[:, 0].astype(np.int64)))
 
 
 def confusion_table(entry: RowScores, name: str) -> Table:
@@ -78,8 +57,8 @@ def confusion_table(entry: RowScores, name: str) -> Table:
     shares = divided(counts, np.broadcast_to(counts.sum(axis=1, keepdims=True), counts.shape))
     labels = [LABELS[name] for name in CLASS_NAMES]
     lines = []
-    for target, of_target, number in zip(labels, shares.tolist(), counts.tolist(), strict=True):
-        cells = [_share_cell(*each, target) for each in zip(of_target, number, labels, strict=True)]
+    for target, of_target, counted in zip(labels, shares.tolist(), counts.tolist(), strict=True):
+        cells = [_share_cell(*each, target) for each in zip(of_target, counted, labels, strict=True)]
         lines.append(Line(target, tuple(cells)))
     caption = f"{entry.row.name}: how each class of the target (line) is predicted (column), in percent of its cells."
     return plain_table(name, caption, "Target", labels, lines)
@@ -149,3 +128,74 @@ def _tables(metric: Metric, division: Division, parts: Parts) -> list[Table]:
     alone = len(division.regions) == 1
     tables = (next(iter(each.values())) if alone else side_by_side(each) for each in (shown, gaps))
     return [table for table in tables if table is not None]
+
+
+def changes_table(scores: Scores) -> Table | None:
+    """Show what each row changes against the row of its model above it that it is closest to, and what that does."""
+    entries, lines = list(scores.values()), []
+    for at, entry in enumerate(entries):
+        base = _closest(entry, entries[:at])
+        changed = changed_settings(settings_of(base.row), settings_of(entry.row)).values() if base else ()
+        if base is None or not changed:
+            continue
+        cells = (Cell("; ".join(changed)), *(_change(entry, base, column) for column in DIFFERENCE_COLUMNS))
+        sign = MINUS if comparable(entry.row, base.row) else "beside"
+        lines.append(Line(f"{entry.row.name} {sign} {base.row.name}", cells))
+    caption = (
+        "What each row changes against the row above it that has the same model and the fewest other settings, "
+        "and the difference of their scores. Where the targets are others, both scores are shown instead."
+    )
+    columns = ["Settings", *(LABELS[column] for column in DIFFERENCE_COLUMNS)]
+    return plain_table("changes", caption, "Rows", columns, lines) if lines else None
+
+
+def not_compared_table(scores: Scores) -> Table | None:
+    """List the rows whose targets are others than those of the main group, and what makes them so."""
+    rows = [entry.row for entry in scores.values()]
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(row.targets, []).append(row)
+    if len(groups) < 2:
+        return None
+    main = main_group(rows)[0]
+    with_main = groups.pop(main.targets)
+    caption = (
+        f"Not compared with {main.name} and the rows that share its targets. Scores are subtracted only between "
+        "rows with the same targets: the same frames of the same logs, grid, mask mode and split."
+    )
+    lines = [_other_targets(group, with_main) for group in groups.values()]
+    return plain_table("not-compared", caption, "Rows with the same targets", ("What differs", "Windows"), lines)
+
+
+def _other_targets(group: Sequence[Row], with_main: Sequence[Row]) -> Line:
+    """Say what makes the targets of a group of rows others than those of the row that they are closest to."""
+    row = group[0]
+    base = min(with_main, key=lambda other: len(changed_settings(settings_of(other), settings_of(row))))
+    reasons = changed_targets(settings_of(base), settings_of(row)) or ["the logs or their frames"]
+    shared = shared_windows(row, base)
+    cells = (
+        Cell(f"{'; '.join(reasons)} (against {base.name})"),
+        Cell(f"{row.windows:,}", row.windows, f"{shared:,} shared"),
+    )
+    return Line(", ".join(each.name for each in group), cells)
+
+
+def _closest(entry: RowScores, above: Sequence[RowScores]) -> RowScores | None:
+    """Find the row of the same model and run with the fewest other settings, rather one with the same targets."""
+    mine = entry.row
+
+    def distance(other: RowScores) -> tuple[int, bool]:
+        changed = changed_settings(settings_of(other.row), settings_of(mine))
+        return len(changed), not comparable(mine, other.row)
+
+    alike = (e for e in above if (e.row.record.facts.model, e.row.run) == (mine.record.facts.model, mine.run))
+    return min(alike, key=distance, default=None)
+
+
+def _change(entry: RowScores, base: RowScores, column: str) -> Cell:
+    title = f"{plural(entry.row.windows, 'window')}; {plural(len(entry.row.results), 'result')}"
+    if not comparable(entry.row, base.row):
+        text = f"{number(entry.mean[column])}, {number(base.mean[column])}"
+        return Cell(text, note="other targets", title=f"{title}; the targets differ, so there is no difference")
+    difference = entry.minus(base, column)
+    return difference_cell(difference, title=f"{title}; {interval_phrase(difference, with_sign=True)}")

@@ -1,17 +1,13 @@
-"""What a table on the page is made of, and how numbers are written in it."""
+"""What a table on the page is made of, and what its formats in files share."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
-from semgrid_eval.report.estimates.bootstrap import LEVEL, Estimate
+from semgrid_eval.report.estimates.bootstrap import Estimate
 from semgrid_eval.report.rows.pairing import verdict
-
-Better = Literal["higher", "lower", ""]
-"""Which of two values is the better one; empty where neither is."""
-ABSENT = "\N{EN DASH}"
-MINUS = "\N{MINUS SIGN}"
+from semgrid_eval.report.tables.numbers import finite, interval, number, signed
+from semgrid_eval.scores.metrics.metric import Better
 
 
 @dataclass(frozen=True)
@@ -52,38 +48,6 @@ def plain_table(name: str, caption: str, corner: str, columns: Sequence[str], li
     return Table(name, caption, corner, tuple((column, "") for column in columns), tuple((line,) for line in lines))
 
 
-def number(value: float) -> str:
-    """Write an IoU with three digits, a dash where it is absent."""
-    return f"{value:.3f}" if math.isfinite(value) else ABSENT
-
-
-def signed(value: float) -> str:
-    """Write a difference with its sign; none at all has no sign."""
-    if value == 0:
-        return "0.000"
-    return f"{value:+.3f}".replace("-", MINUS) if math.isfinite(value) else ABSENT
-
-
-def interval(estimate: Estimate, *, with_sign: bool = False) -> str:
-    """Write an interval, empty where there is none."""
-    if not math.isfinite(estimate.low):
-        return ""
-    if with_sign:
-        return f"{signed(estimate.low)} to {signed(estimate.high)}"
-    return f"{number(estimate.low)}\N{EN DASH}{number(estimate.high)}"
-
-
-def interval_phrase(estimate: Estimate, *, with_sign: bool = False) -> str:
-    """Write an interval with its level, for sentences and tooltips."""
-    text = interval(estimate, with_sign=with_sign)
-    return f"{LEVEL:.0%} interval {text}" if text else "no interval"
-
-
-def plural(count: int, noun: str) -> str:
-    """Write a count with its noun."""
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
-
-
 def value_cell(estimate: Estimate, *, title: str = "", best: bool = False) -> Cell:
     """Show a score with its interval."""
     tone = "best" if best else ""
@@ -92,25 +56,30 @@ def value_cell(estimate: Estimate, *, title: str = "", best: bool = False) -> Ce
 
 def difference_cell(difference: Estimate, *, title: str = "", better: Better = "higher") -> Cell:
     """Show a difference with its interval, toned by its verdict."""
-    note, tone = interval(difference, with_sign=True), _tone(difference, better)
+    lower = Estimate(-difference.value, -difference.high, -difference.low)
+    tone = {"higher": verdict(difference), "lower": verdict(lower), "": ""}[better]
+    note = interval(difference, with_sign=True)
     return Cell(signed(difference.value), finite(difference.value), note, title, tone, _bounds(difference))
-
-
-def plain_cell(value: float, *, title: str = "") -> Cell:
-    """Show a number without an interval."""
-    return Cell(number(value), finite(value), title=title)
-
-
-def finite(value: float) -> float | None:
-    """Return a value, None where it is absent."""
-    return value if math.isfinite(value) else None
 
 
 def _bounds(estimate: Estimate) -> tuple[float, float] | None:
     return (estimate.low, estimate.high) if math.isfinite(estimate.low) else None
 
 
-def _tone(difference: Estimate, better: Better) -> str:
-    if better == "lower":
-        difference = Estimate(-difference.value, -difference.high, -difference.low)
-    return verdict(difference) if better else ""
+def one_line(text: str) -> str:
+    """Turn what ends a line, or cannot be printed, into spaces."""
+    return " ".join("".join(character if character.isprintable() else " " for character in text).split())
+
+
+def heads(table: Table) -> list[str]:
+    """Return the headers of all columns, with the region of each where there are several."""
+    several = len(dict(table.columns)) < len(table.columns)
+    parts = ((label, note.rpartition(", ")[0]) for label, note in table.columns)
+    return [table.corner, *(f"{label} ({part})" if several and part else label for label, part in parts)]
+
+
+def lines(table: Table) -> Iterator[tuple[str, tuple[Cell, ...]]]:
+    """Go through the lines; the header of one that belongs to another names that one, too."""
+    for body in table.bodies:
+        for line in body:
+            yield line.header if line is body[0] else f"{body[0].header}: {line.header}", line.cells

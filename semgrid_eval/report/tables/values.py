@@ -5,25 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from semgrid_eval.report.claims.paper import paper_table
+from semgrid_eval.report.claims.claims import paper_table
 from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores
 from semgrid_eval.report.rows.load import comparable
 from semgrid_eval.report.rows.pairing import reference_of, verdict
-from semgrid_eval.report.tables.table import (
-    ABSENT,
-    MINUS,
-    Cell,
-    Line,
-    Table,
-    difference_cell,
-    finite,
-    interval_phrase,
-    number,
-    plain_cell,
-    plural,
-    signed,
-    value_cell,
-)
+from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, plural, signed
+from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
 from semgrid_eval.scores.metrics.metric import column_of
 
 _OTHER_TARGETS = " Rows whose targets differ (frames, grids, mask mode or split) are not compared with each other."
@@ -64,7 +51,8 @@ def best_rows(scores: Scores, column: str) -> set[str]:
     """Name the rows that are the best of those on the same targets; none is where it stands alone among others."""
     groups: dict[str, dict[str, float]] = {}
     for name, entry in scores.items():
-        groups.setdefault(entry.row.targets, {})[name] = _worth(entry, column)
+        sign = {"higher": 1.0, "lower": -1.0, "": np.nan}[column_of(entry.metric, column).better]
+        groups.setdefault(entry.row.targets, {})[name] = entry.mean[column] * sign
     best: set[str] = set()
     for values in groups.values():
         top = max(filter(np.isfinite, values.values()), default=None)
@@ -92,11 +80,6 @@ def short_count(count: int) -> str:
     return f"{count / 10**6:.3g} M" if count >= 10**6 else f"{count / 10**3:.3g} k"
 
 
-def _worth(entry: RowScores, column: str) -> float:
-    """Return a value that is the larger the better; NaN where none is better than another."""
-    return entry.mean[column] * {"higher": 1.0, "lower": -1.0, "": np.nan}[column_of(entry.metric, column).better]
-
-
 def _value_body(entry: RowScores, best: Mapping[str, set[str]], *, beside_paper: bool) -> tuple[Line, ...]:
     values = tuple(
         value_cell(entry.estimate(name), title=evidence(entry, name), best=entry.row.name in rows)
@@ -106,7 +89,9 @@ def _value_body(entry: RowScores, best: Mapping[str, set[str]], *, beside_paper:
     paper = paper_table().get(entry.row.record.name, {}) if beside_paper else {}
     if set(best) <= set(paper):
         source = f"the paper's {entry.row.record.name}, Table A1: mean over 20 seeds, Cityscapes"
-        lines.append(Line("paper", tuple(plain_cell(paper[name], title=source) for name in best), "paper"))
+        lines.append(
+            Line("paper", tuple(Cell(number(paper[n]), finite(paper[n]), title=source) for n in best), "paper")
+        )
         lines.append(Line("difference", tuple(_paper_gap(entry, name, paper[name]) for name in best), "paper"))
     return tuple(lines)
 

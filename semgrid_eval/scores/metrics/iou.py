@@ -54,7 +54,7 @@ class Iou(Metric):
         target, predicted = sums.sum(axis=-1), sums.sum(axis=-2)
         members, classes = averaged_members(), [(i,) for i in range(CLASS_COUNT)]
         groups = classes + [members[name.removeprefix("merged_")] for name in MERGED_COLUMNS]
-        both = np.stack([_between(sums, ids) for ids in groups], axis=-1)
+        both = np.stack([sum(sums[..., i, j] for i in ids for j in ids) for ids in groups], axis=-1)
         each = np.stack([(target + predicted)[..., list(ids)].sum(axis=-1) for ids in groups], axis=-1)
         return np.stack([both, each - both], axis=-1)
 
@@ -75,11 +75,6 @@ class Iou(Metric):
         table = averaged_members() | {f"merged_{name}": ids for name, ids in averaged_members().items()}
         table |= {name: (i,) for i, name in enumerate(CLASS_NAMES)}
         return np.array([[i in table[column.name] for i in range(CLASS_COUNT)] for column in self.columns], np.int64)
-
-
-def _between(sums: Counts, ids: tuple[int, ...]) -> Counts:
-    """Count the cells of some classes that are predicted to be of one of them: (..., C, C) -> (...)."""
-    return np.asarray(sum(sums[..., i, j] for i in ids for j in ids))
 
 
 def confusion(target: NDArray[np.uint8], prediction: NDArray[np.uint8], mask: NDArray[np.bool_]) -> Counts:

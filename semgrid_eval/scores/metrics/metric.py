@@ -1,6 +1,7 @@
-"""What a metric is, and what it sees: scored windows whose cells are divided into regions."""
+"""What a metric is, and what it sees: scored windows whose cells are divided into regions by partitions."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
@@ -11,6 +12,8 @@ from semgrid_eval.grids.spec import GridSpec
 Counts = NDArray[np.int64]
 Floats = NDArray[np.float64]
 Grid = NDArray[np.uint8]
+Better = Literal["higher", "lower", ""]
+"""Which of two values is the better one; empty where neither is."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Column:
 
     name: str
     label: str
-    better: Literal["higher", "lower", ""] = "higher"
+    better: Better = "higher"
 
 
 class Metric(Protocol):
@@ -101,3 +104,21 @@ def divided(part: NDArray[np.number], whole: Counts) -> Floats:
 def mean_finite(values: Floats, *, axis: int = -1) -> Floats:
     """Mean of the values along an axis that are there, NaN where none is."""
     return divided(np.nansum(values, axis=axis), np.isfinite(values).sum(axis=axis))
+
+
+CellNumbers = Callable[[ScoredWindows], NDArray[np.int64] | None]
+
+
+@dataclass(frozen=True)
+class Partition:
+    """Cells of windows divided into regions.
+
+    `number` numbers the region of each cell (N, H, W), -1 where it is in none; it returns None where windows do not
+    tell. `shown` is what a report shows: columns by metric; of a metric that is not named, nothing.
+    """
+
+    name: str  # in files and columns
+    regions: Sequence[str]  # their names, as a reader sees them
+    words: str  # which cells the regions hold, to follow "IoU"; empty where it is all of them
+    number: CellNumbers
+    shown: Mapping[str, Sequence[str]] = field(default_factory=dict)

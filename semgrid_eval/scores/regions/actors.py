@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.grids.spec import MOVING, STANDING
-from semgrid_eval.scores.metrics.metric import ScoredWindows
-from semgrid_eval.scores.regions.partition import Partition
+from semgrid_eval.scores.metrics.metric import Partition, ScoredWindows
 
 
 def _number(scored: ScoredWindows) -> NDArray[np.int64] | None:

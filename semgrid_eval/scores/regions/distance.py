@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.grids.spec import GridSpec
-from semgrid_eval.scores.metrics.metric import ScoredWindows
-from semgrid_eval.scores.regions.partition import Partition
+from semgrid_eval.scores.metrics.metric import Partition, ScoredWindows
 
 EDGES_M = (20.0, 40.0, 60.0)
 

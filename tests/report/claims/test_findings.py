@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.fake_run import FakeRow, counted_row, make_fake_run
+from support.scoring import score_rows
 
 from semgrid_eval.report.claims.claims import MARGIN, claims
 from semgrid_eval.report.claims.findings import (
@@ -20,9 +21,8 @@ from semgrid_eval.report.claims.findings import (
     missing_table,
     sentence,
 )
-from semgrid_eval.report.estimates.bootstrap import Estimate, score_regions, score_rows
+from semgrid_eval.report.estimates.bootstrap import Estimate, Resampling, score_regions
 from semgrid_eval.report.estimates.division import of_cells
-from semgrid_eval.report.estimates.resampling import Resampling
 from semgrid_eval.report.rows.load import Run, load_runs
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.scores.metrics.table import IOU

@@ -4,7 +4,7 @@ from operator import getitem
 
 import pytest
 
-from semgrid_eval.report.claims.paper import PAPER_REPEATS, PAPER_SETTINGS, PAPER_WINDOWS, scaling
+from semgrid_eval.report.claims.claims import PAPER_REPEATS, PAPER_SETTINGS, PAPER_WINDOWS, scaling
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.runs.matrix import load_matrix
 

@@ -3,19 +3,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.fake_run import counted_row, make_fake_run, reader
+from support.scoring import score_rows
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.estimates.bootstrap import (
     LABELS,
     Estimate,
+    Resampling,
     RowScores,
     comparable,
+    recording_weights,
     score_regions,
-    score_rows,
 )
 from semgrid_eval.report.estimates.division import EVERYWHERE, of_cells
-from semgrid_eval.report.estimates.resampling import Resampling, recording_weights
 from semgrid_eval.report.rows.load import load_runs
+from semgrid_eval.report.rows.pairing import verdict
 from semgrid_eval.scores.metrics.iou import class_iou
 from semgrid_eval.scores.metrics.table import IOU, METRICS
 from semgrid_eval.scores.regions.actors import ACTORS
@@ -141,7 +143,7 @@ def test_a_row_does_not_differ_from_itself(run):
     rows = load_runs([run])[0].rows[:1]
     entry = score_rows(rows, np.random.default_rng(0))[rows[0].name]
     assert entry.minus(entry, "road") == Estimate(0.0, 0.0, 0.0)
-    assert not entry.minus(entry, "road").sure
+    assert verdict(entry.minus(entry, "road")) == "open"
 
 
 def test_rows_that_share_their_trainings_do_not_differ(run):
@@ -180,7 +182,7 @@ def test_one_recording_gives_no_interval(tmp_path):
     rows = load_runs([make_fake_run(tmp_path / "run", recordings=1)])[0].rows
     entry = score_rows(rows, np.random.default_rng(0))["BL-DC"]
     assert np.isnan(entry.estimate("road").low)
-    assert not entry.estimate("road").sure
+    assert verdict(entry.estimate("road")) == "open"
 
 
 def test_an_interval_is_the_middle_of_the_draws(run):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from support.fake_run import FRAME_NS, FakeRow, make_fake_run
+from support.scoring import score_rows
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.report.estimates.bootstrap import score_regions, score_rows
+from semgrid_eval.report.estimates.bootstrap import Resampling, score_regions
 from semgrid_eval.report.estimates.paces import PACES, mean_speed_mps, paces
-from semgrid_eval.report.estimates.resampling import Resampling
 from semgrid_eval.report.page.write import rows_without, write_report
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.metrics.iou import class_iou

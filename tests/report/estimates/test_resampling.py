@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from semgrid_eval.report.estimates.resampling import Resampling, group_weights, recording_weights
+from semgrid_eval.report.estimates.bootstrap import Resampling, group_weights, recording_weights
 
 GROUPS = ["a"] * 5 + ["b"] * 2 + ["c"] * 3 + ["d"]
 

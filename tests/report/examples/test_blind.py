@@ -8,8 +8,7 @@ from support.toy_world import street
 from semgrid_eval.arrays import read_arrays
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.report.examples.blind import blind_cells
-from semgrid_eval.report.examples.thumbnails import RunThumbnails
+from semgrid_eval.report.examples.thumbnails import RunThumbnails, blind_cells
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.results import WindowRecord, windows_file
 from semgrid_eval.scores.thumbnails import Track

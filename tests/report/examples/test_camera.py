@@ -8,9 +8,8 @@ from PIL import Image
 
 from semgrid_eval.classes import CLASS_NAMES, class_palette
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.report.examples.camera import View
 from semgrid_eval.report.examples.drawing import POINTLESS, POINTLESS_COLOUR
-from semgrid_eval.report.examples.thumbnails import RunThumbnails
+from semgrid_eval.report.examples.thumbnails import RunThumbnails, View
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.thumbnails import FramePictures
 

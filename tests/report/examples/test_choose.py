@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.fake_run import FakeRow, make_fake_run, with_counts
+from support.scoring import score_rows
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
-from semgrid_eval.report.estimates.bootstrap import score_rows
 from semgrid_eval.report.examples.choose import (
     MIN_CELLS,
     Contest,

@@ -4,9 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.fake_run import FakeRow, make_fake_run
+from support.scoring import score_rows
 
 from semgrid_eval.grids.spec import GridConfig, GridSpec
-from semgrid_eval.report.estimates.bootstrap import score_rows
 from semgrid_eval.report.examples import gallery as gallery_module
 from semgrid_eval.report.examples.choose import Contest, choose
 from semgrid_eval.report.examples.gallery import example_groups, gaps, groups_of, widths

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.fake_run import FakeRow, counted_row, make_fake_run
+from support.scoring import score_rows
 
-from semgrid_eval.report.estimates.bootstrap import score_rows
-from semgrid_eval.report.figures.bars import category_plots, lay_out
+from semgrid_eval.report.figures.categories import category_plots, lay_out
 from semgrid_eval.report.figures.style import INK, PALETTE, family_colours
 from semgrid_eval.report.rows.load import load_runs
 

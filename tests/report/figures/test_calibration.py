@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
 
-from semgrid_eval.report.estimates.bootstrap import score_regions
+from semgrid_eval.report.estimates.bootstrap import Resampling, score_regions
 from semgrid_eval.report.estimates.division import EVERYWHERE
-from semgrid_eval.report.estimates.resampling import Resampling
-from semgrid_eval.report.figures.calibration import calibration_frame, calibration_plots
+from semgrid_eval.report.figures.curves import calibration_frame, calibration_plots
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.metrics.table import CALIBRATION
 

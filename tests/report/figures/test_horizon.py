@@ -3,9 +3,9 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 from support.fake_run import FakeRow, make_fake_run
+from support.scoring import score_rows
 
-from semgrid_eval.report.estimates.bootstrap import score_rows
-from semgrid_eval.report.figures.horizon import horizon_lines, horizon_plots
+from semgrid_eval.report.figures.categories import horizon_lines, horizon_plots
 from semgrid_eval.report.rows.load import load_runs
 
 ROWS = (

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from semgrid_eval.report.figures.training import training_plots
+from semgrid_eval.report.figures.curves import training_plots
 from semgrid_eval.report.rows.load import load_runs
 
 

@@ -2,7 +2,7 @@ import shlex
 
 import pytest
 
-from semgrid_eval.report.page.commands import play_command, row_command
+from semgrid_eval.report.page.provenance import play_command, row_command
 
 
 @pytest.mark.parametrize(

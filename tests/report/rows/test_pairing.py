@@ -4,8 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.fake_run import FakeRow, counted_row, make_fake_run
+from support.scoring import score_rows
 
-from semgrid_eval.report.estimates.bootstrap import Estimate, score_rows
+from semgrid_eval.report.estimates.bootstrap import Estimate
 from semgrid_eval.report.page.provenance import failures
 from semgrid_eval.report.page.summary import summarise
 from semgrid_eval.report.rows.load import Run, load_runs

@@ -1,5 +1,5 @@
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.rows.settings import changed_settings, changed_targets, settings_but
+from semgrid_eval.report.rows.pairing import changed_settings, changed_targets, settings_but
 
 
 def test_settings_are_compared_key_by_key():

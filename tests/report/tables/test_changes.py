@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.fake_run import FakeRow, make_fake_run
+from support.scoring import score_rows
 
-from semgrid_eval.report.estimates.bootstrap import score_rows
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables.changes import changes_table, not_compared_table
+from semgrid_eval.report.tables.scores import changes_table, not_compared_table
 
 MODELS = ("BL", "ED")
 

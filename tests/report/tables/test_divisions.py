@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 from support.fake_run import FakeRow, make_fake_run
 
-from semgrid_eval.report.estimates.bootstrap import score_all
-from semgrid_eval.report.estimates.resampling import Resampling
-from semgrid_eval.report.estimates.table import divisions
+from semgrid_eval.report.estimates.bootstrap import Resampling, score_all
+from semgrid_eval.report.estimates.paces import divisions
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables.scores import division_tables
-from semgrid_eval.scores.metrics.metric import Column, divided
+from semgrid_eval.scores.metrics.metric import Column, Partition, divided
 from semgrid_eval.scores.metrics.table import METRICS
-from semgrid_eval.scores.regions.partition import Partition
 from semgrid_eval.scores.regions.table import PARTITIONS
 
 

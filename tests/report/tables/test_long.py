@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
 
-from semgrid_eval.report.estimates.bootstrap import score_all
-from semgrid_eval.report.estimates.resampling import Resampling
-from semgrid_eval.report.estimates.table import divisions
+from semgrid_eval.report.estimates.bootstrap import Resampling, score_all
+from semgrid_eval.report.estimates.paces import divisions
+from semgrid_eval.report.page.exports import SUMMARY_COLUMNS, division_records, seed_frame, summary_frame
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables.long import SUMMARY_COLUMNS, division_records, seed_frame, summary_frame
 from semgrid_eval.scores.metrics.table import METRICS
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.tidy import FIGURE_COLUMNS, load_figures

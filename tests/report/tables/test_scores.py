@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
+from support.scoring import score_rows
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.report.claims.paper import paper_table
-from semgrid_eval.report.estimates.bootstrap import score_rows
+from semgrid_eval.report.claims.claims import paper_table
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables import scores as tables
-from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS, category_iou, class_iou
+from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS
 
 
 @pytest.fixture(scope="module")
@@ -45,13 +45,6 @@ def test_a_number_tells_what_stands_behind_it(scores):
     title = _body(shown(scores)["classes"], "ED-DC")[0].cells[CLASS_NAMES.index("car")].title
     for words in ("cells", "16 windows", "3 seeds", "95% interval"):
         assert words in title
-
-
-def test_means_over_windows_are_means_of_each_windows_scores(scores):
-    counts = scores["BL-DC"].row.results[0].counts.astype(np.int64)
-    vehicles = [float(category_iou(class_iou(window))["vehicles"]) for window in counts]
-    cell = _body(tables.window_means(scores), "BL-DC")[0].cells[CATEGORY_COLUMNS.index("vehicles")]
-    assert cell.sort == pytest.approx(np.nanmean(vehicles))
 
 
 def test_confusions_are_shares_of_the_targets_cells(scores):

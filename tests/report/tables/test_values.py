@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.fake_run import counted_row
+from support.scoring import score_rows
 
-from semgrid_eval.report.estimates.bootstrap import score_regions, score_rows
+from semgrid_eval.report.estimates.bootstrap import Resampling, score_regions
 from semgrid_eval.report.estimates.division import EVERYWHERE, of_cells
-from semgrid_eval.report.estimates.resampling import Resampling
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables.values import (
     best_rows,

@@ -1,10 +1,11 @@
 import numpy as np
 import pandas as pd
 import pytest
+from support.scoring import score_rows
 
 from semgrid_eval.files import read_json
-from semgrid_eval.report.claims.paper import paper_table
-from semgrid_eval.report.estimates.bootstrap import LABELS, score_rows
+from semgrid_eval.report.claims.claims import paper_table
+from semgrid_eval.report.estimates.bootstrap import LABELS
 from semgrid_eval.report.page.write import write_report
 from semgrid_eval.report.rows.load import load_runs
 

@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from semgrid_eval.report.tables.formats.text import heads, lines
-from semgrid_eval.report.tables.table import Cell, Table
+from semgrid_eval.report.tables.table import Cell, Table, heads, lines
 
 
 def as_csv(table: Table) -> str:

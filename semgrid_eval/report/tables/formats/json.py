@@ -3,8 +3,7 @@
 import json
 from typing import Any
 
-from semgrid_eval.report.tables.formats.text import heads, lines
-from semgrid_eval.report.tables.table import Cell, Table
+from semgrid_eval.report.tables.table import Cell, Table, heads, lines
 
 
 def as_json(table: Table) -> str:

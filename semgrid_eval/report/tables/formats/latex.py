@@ -1,7 +1,7 @@
 """A table as LaTeX (package booktabs)."""
 
-from semgrid_eval.report.tables.formats.text import heads, lines, one_line
-from semgrid_eval.report.tables.table import ABSENT, MINUS, Cell, Table
+from semgrid_eval.report.tables.numbers import ABSENT, MINUS
+from semgrid_eval.report.tables.table import Cell, Table, heads, lines, one_line
 
 _ESCAPES = str.maketrans(
     {

@@ -1,7 +1,6 @@
 """A table as Markdown."""
 
-from semgrid_eval.report.tables.formats.text import heads, lines, one_line
-from semgrid_eval.report.tables.table import Cell, Table
+from semgrid_eval.report.tables.table import Cell, Table, heads, lines, one_line
 
 
 def as_markdown(table: Table) -> str:

@@ -7,8 +7,8 @@ import re
 import pandas as pd
 import pytest
 from support.fake_run import HOSTILE
+from support.scoring import score_rows
 
-from semgrid_eval.report.estimates.bootstrap import score_rows
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables.formats.csv import as_csv
 from semgrid_eval.report.tables.formats.json import as_json

@@ -2,11 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.scoring import score_rows
 
-from semgrid_eval.report.estimates.bootstrap import score_rows
-from semgrid_eval.report.figures.settings import settings_frame, settings_plots
+from semgrid_eval.report.figures.settings import settings_frame, settings_plots, varied_settings
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.rows.settings import varied_settings
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Category scores of every row as bars, grouped by question, with intervals and the paper's own values (its Fig. 5)."""
+"""Category scores beside the paper's: as bars, grouped by question (its Fig. 5), and as lines over the lead time."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,22 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from semgrid_eval.classes import CATEGORY_NAMES
-from semgrid_eval.report.claims.paper import paper_value
+from semgrid_eval.report.claims.claims import paper_value
 from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
-from semgrid_eval.report.figures.style import (
-    INK,
-    MUTED,
-    PAPER_MARKS,
-    SETTINGS,
-    Plot,
-    evidence,
-    family_colours,
-    finish,
-    paper_note,
-    short,
-)
+from semgrid_eval.report.figures import style
 from semgrid_eval.report.rows.load import Row
-from semgrid_eval.report.rows.pairing import by_question
+from semgrid_eval.report.rows.pairing import by_question, settings_but
 
 _GAP = 1.0  # between questions, in bars' places; the words of a question stand in it
 _BAR_IN, _AROUND_IN = 0.19, 0.75  # height of a bar's place, and of title, legend and axis together
@@ -41,24 +30,25 @@ class Group:
     places: dict[str, float]
 
 
-def category_plots(scores: Scores) -> list[Plot]:
+def category_plots(scores: Scores) -> list[style.Plot]:
     """Draw a panel for each category side by side in one figure, which names the rows once."""
     if not scores:
         return []
     groups = lay_out(scores)
     places = [place for group in groups for place in group.places.values()]
     size_in = (_WIDE_IN, _AROUND_IN + _BAR_IN * (max(places) + 1 + _GAP))
-    with mpl.rc_context(SETTINGS):
+    with mpl.rc_context(style.SETTINGS):
         figure = Figure(figsize=size_in, layout="constrained")
         panels = figure.subplots(1, len(CATEGORY_NAMES), sharey=True)
-        colours = family_colours(entry.row for entry in scores.values())
+        colours = style.family_colours(entry.row for entry in scores.values())
         for axes, category in zip(panels, CATEGORY_NAMES, strict=True):
             _panel(axes, scores, category, groups, colours)
         _name_rows(panels[0], groups)
-        handles, labels = [Patch(color=colour) for colour in colours.values()], list(map(short, colours))
+        handles, labels = [Patch(color=colour) for colour in colours.values()], list(map(style.short, colours))
         figure.legend(handles, labels, fontsize=8, ncols=len(labels), loc="outside upper right", handlelength=1)
-        caption = f"Category IoU by row ({evidence(scores)}). Rows that answer the same question stand together;"
-        return [finish(figure, "categories", "summary.csv", f"{caption} lines are 95% intervals{paper_note(scores)}")]
+        caption = f"Category IoU by row ({style.evidence(scores)}). Rows that answer the same question stand together;"
+        caption += f" lines are 95% intervals{style.paper_note(scores)}"
+        return [style.finish(figure, "categories", "summary.csv", caption)]
 
 
 def lay_out(scores: Scores) -> list[Group]:
@@ -91,9 +81,9 @@ def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str)
     estimate, paper = entry.estimate(category), paper_value(entry.row.record.name, category)
     axes.barh(place, np.nan_to_num(estimate.value), 0.78, color=colour)
     if np.isfinite(estimate.low):
-        axes.plot([estimate.low, estimate.high], [place, place], color=INK, linewidth=1)
+        axes.plot([estimate.low, estimate.high], [place, place], color=style.INK, linewidth=1)
     if np.isfinite(paper):
-        axes.plot(paper, place, "D", markersize=3.4, **PAPER_MARKS)
+        axes.plot(paper, place, "D", markersize=3.4, **style.PAPER_MARKS)
     label = f"{estimate.value:.2f}" if np.isfinite(estimate.value) else "absent"
     axes.text(1, place, label, transform=axes.get_yaxis_transform(), ha="right", va="center", fontsize=7)
     return float(np.nanmax([0.0, estimate.value, estimate.high, paper]))
@@ -102,11 +92,11 @@ def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str)
 def _name_rows(axes: Axes, groups: Sequence[Group]) -> None:
     """Write each row's name at its bar, and each question above its rows."""
     places = {name: place for group in groups for name, place in group.places.items()}
-    axes.set_yticks(list(places.values()), [short(name) for name in places], fontsize=8)
+    axes.set_yticks(list(places.values()), [style.short(name) for name in places], fontsize=8)
     axes.set_ylim(max(places.values()) + 0.6, -_GAP - 0.3)  # downwards
     for group in groups if len(groups) > 1 else ():
-        above = min(group.places.values()) - 0.78
-        axes.annotate(group.words, (0, above), (2, 0), textcoords="offset points", va="center", color=MUTED, fontsize=7)
+        at = (0, min(group.places.values()) - 0.78)
+        axes.annotate(group.words, at, (2, 0), textcoords="offset points", va="center", color=style.MUTED, fontsize=7)
 
 
 def _words(row: Row, first: Row) -> str:
@@ -119,7 +109,7 @@ def _differences(row: Row, first: Row | None) -> Iterator[str]:
     if theirs is None or mine.inputs != theirs.inputs:
         yield f"{mine.inputs} input{'' if mine.inputs == 1 else 's'}"
     if theirs is None or mine.sensors != theirs.sensors:
-        yield short(" + ".join(mine.sensors), 40)
+        yield style.short(" + ".join(mine.sensors), 40)
     if theirs is None or (mine.horizon_steps, mine.step_frames) != (theirs.horizon_steps, theirs.step_frames):
         yield f"{row.results[0].record.lead_s:.2f} s ahead"
     if not mine.translate and (theirs is None or theirs.translate):
@@ -128,3 +118,50 @@ def _differences(row: Row, first: Row | None) -> Iterator[str]:
         yield "inputs moved to the target's time"
     if first is not None and row.targets != first.targets:
         yield "other targets"
+
+
+def horizon_lines(scores: Scores) -> list[list[RowScores]]:
+    """Return the rows of one run with the same targets that differ in the horizon alone, by lead; at least two."""
+    lines: dict[object, dict[float, RowScores]] = {}
+    for entry in scores.values():
+        key = (entry.row.run, entry.row.targets, settings_but(entry.row, "horizon_steps"))
+        lines.setdefault(key, {}).setdefault(_lead_s(entry), entry)  # rows that mean the same are one point
+    found = [[line[lead] for lead in sorted(line)] for line in lines.values() if len(line) > 1]
+    return sorted(found, key=lambda line: not line[0].row.is_baseline)
+
+
+def horizon_plots(scores: Scores) -> list[style.Plot]:
+    """Draw category scores over the lead time with intervals, where a model was scored at several."""
+    lines = horizon_lines(scores)
+    if not lines:
+        return []
+    drawn = {entry.row.name: entry for line in lines for entry in line}
+    with mpl.rc_context(style.SETTINGS):
+        figure = Figure(figsize=(11.3, 3.0), layout="constrained")
+        for axes, category in zip(figure.subplots(1, len(CATEGORY_NAMES), sharex=True), CATEGORY_NAMES, strict=True):
+            for index, line in enumerate(lines):
+                _line(axes, line, category, style.PALETTE[index % len(style.PALETTE)])
+            axes.set_title(LABELS[category], loc="left", fontweight="bold")
+            axes.set_xticks(leads := sorted({_lead_s(e) for e in drawn.values()}), [f"{lead:.2f}" for lead in leads])
+            axes.margins(x=0.12)
+        figure.axes[0].set_ylabel("IoU")
+        figure.axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        figure.supxlabel("lead time / s: from the newest input to the target", fontsize=9)
+        caption = "Category IoU over the lead time with 95% intervals, a line for rows that differ in the horizon alone"
+        caption += f" ({style.evidence(drawn)}){style.paper_note(drawn)}"
+        return [style.finish(figure, "horizon", "summary.csv", caption)]
+
+
+def _line(axes: Axes, line: Sequence[RowScores], category: str, colour: str) -> None:
+    leads = [_lead_s(entry) for entry in line]
+    estimates = [entry.estimate(category) for entry in line]
+    name = style.short(f"{line[0].row.name} \N{HORIZONTAL ELLIPSIS} {line[-1].row.name}")
+    axes.plot(leads, [e.value for e in estimates], "o-", color=colour, label=name, markersize=4)
+    low, high = [e.low for e in estimates], [e.high for e in estimates]
+    axes.fill_between(leads, low, high, color=colour, alpha=0.18, linewidth=0)
+    papers = [paper_value(entry.row.record.name, category) for entry in line]
+    axes.plot(leads, papers, "D", markersize=4, **(style.PAPER_MARKS | {"markeredgecolor": colour}))
+
+
+def _lead_s(entry: RowScores) -> float:
+    return entry.row.results[0].record.lead_s

@@ -1,0 +1,227 @@
+"""What a report is written from, and its files beside the page: long tables, the page's own, figures, report.json."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pandas as pd
+
+from semgrid_eval import __version__
+from semgrid_eval.files import write_json, write_text
+from semgrid_eval.report.claims.claims import scaling
+from semgrid_eval.report.claims.findings import Finding, find, finding_frame, finding_records
+from semgrid_eval.report.estimates.bootstrap import (
+    LEVEL,
+    Estimate,
+    Everything,
+    Resampling,
+    RowScores,
+    Scores,
+    everywhere,
+    score_all,
+)
+from semgrid_eval.report.estimates.paces import divisions
+from semgrid_eval.report.figures import categories, curves, settings
+from semgrid_eval.report.figures.curves import calibration_frame, training_frame
+from semgrid_eval.report.figures.settings import settings_frame
+from semgrid_eval.report.figures.style import Plot
+from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
+from semgrid_eval.report.rows.load import Result, Row, Run
+from semgrid_eval.report.tables.formats.csv import as_csv, frame_csv
+from semgrid_eval.report.tables.formats.json import as_json
+from semgrid_eval.report.tables.formats.latex import as_latex
+from semgrid_eval.report.tables.formats.markdown import as_markdown
+from semgrid_eval.report.tables.numbers import finite
+from semgrid_eval.report.tables.scores import division_tables, score_tables
+from semgrid_eval.report.tables.table import Table
+from semgrid_eval.report.tables.values import reference_scores
+from semgrid_eval.scores.metrics.metric import column_names
+from semgrid_eval.scores.tidy import FIGURE_COLUMNS
+
+RECORD = "report.json"
+FORMAT_VERSION = 3
+FORMATS: Mapping[str, Callable[[Table], str]] = {"csv": as_csv, "json": as_json, "md": as_markdown, "tex": as_latex}
+"""By the ends of files' names; to add a format, add a line here."""
+_UNSCORED: dict[str, Any] = {"windows": 0, "seeds": 0, "cells": {}, "scores": {}, "reference": None, "differences": {}}
+SUMMARY_COLUMNS = (
+    *("row", "metric", "division", "region", "column", "value", "low", "high"),
+    *("reference", "difference", "difference_low", "difference_high", "cells", "windows", "seeds"),
+)
+_DIFFERENCE = {"value": "difference", "low": "difference_low", "high": "difference_high"}
+
+Records = Mapping[str, Mapping[str, Mapping[str, Mapping[str, dict[str, Any]]]]]
+"""What machines may want to know of a row, by the names of metric, division, region and row."""
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Material:
+    """All that a report is written from; tables and figures by section of the page."""
+
+    runs: Sequence[Run]
+    resampling: Resampling
+    everything: Everything
+    findings: Sequence[Finding]
+    tables: Mapping[str, Table | None]  # of the IoU of all cells
+    parts: Mapping[str, Sequence[Table]]  # of every metric, by division
+    figures: Mapping[str, Sequence[Plot]]
+
+    @property
+    def scores(self) -> Scores:
+        """The IoU of all cells."""
+        return everywhere(self.everything, "iou")
+
+
+def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
+    """Work out everything that a report shows."""
+    rows, parts = [row for each in runs for row in each.rows], divisions(runs)
+    everything = score_all(rows, parts, resampling)
+    scores = everywhere(everything, "iou")
+    findings = find(runs, scores, everything["iou"]["actors"])
+    tables = score_tables(scores, [each.tag for each in runs])
+    figures = {
+        "categories": categories.category_plots(scores),
+        "horizon": categories.horizon_plots(scores),
+        "training": curves.training_plots(rows),
+        "calibration": curves.calibration_plots(everywhere(everything, "calibration")),
+        "settings": settings.settings_plots(scores),
+    }
+    return Material(runs, resampling, everything, findings, tables, division_tables(everything, parts), figures)
+
+
+def write_numbers(folder: Path, material: Material) -> None:
+    """Write the long tables as CSV, each run's matrix and report.json."""
+    runs, records = material.runs, division_records(material.everything)
+    frames = {
+        "summary": summary_frame(records),
+        "scores": seed_frame(material.everything),
+        "findings": finding_frame(material.findings),
+        "calibration": calibration_frame(everywhere(material.everything, "calibration")),
+        "settings": settings_frame(material.scores),
+        "training": training_frame([row for run in runs for row in run.rows]),
+        "windows": window_frame(runs),
+    }
+    for name, frame in frames.items():
+        write_text(folder / f"{name}.csv", frame_csv(frame))
+    for run in runs:
+        write_text(folder / matrix_file(run, runs), matrix_text(run))
+    write_json(folder / RECORD, report_record(material, records))
+
+
+def write_tables(folder: Path, material: Material) -> None:
+    """Write the tables of scores in each format below `tables/`; that of the categories is also summary.md and .tex."""
+    tables = [*material.tables.values(), *(table for each in material.parts.values() for table in each)]
+    for table in (table for table in tables if table is not None and table.bodies):
+        for end, written in FORMATS.items():
+            write_text(folder / "tables" / f"{table.name}.{end}", written(table))
+        if table.name == "categories":
+            for end in ("md", "tex"):
+                write_text(folder / f"summary.{end}", FORMATS[end](table))
+
+
+def write_figures(folder: Path, figures: Mapping[str, Sequence[Plot]]) -> None:
+    """Write each figure as PNG and SVG."""
+    (folder / "figures").mkdir()
+    for plot in (plot for group in figures.values() for plot in group):
+        (folder / "figures" / f"{plot.name}.png").write_bytes(plot.png)
+        (folder / "figures" / f"{plot.name}.svg").write_text(plot.svg, encoding="utf-8")
+
+
+def report_record(material: Material, records: Mapping[str, Any]) -> dict[str, Any]:
+    """Return everything a machine may want to know of a report; absent values are null."""
+    runs, resampling = material.runs, material.resampling
+    scored = records["iou"]["all"].get("all", {})
+    interval = {"level": LEVEL, "draws": resampling.draws, "over": resampling.level, "why": resampling.sentence}
+    return {
+        "format_version": FORMAT_VERSION,
+        "semgrid_eval": __version__,
+        "interval": interval,
+        "runs": [{"tag": r.tag, "scaling": scaling(r), "data": data_sets(r.record), "record": _bare(r)} for r in runs],
+        "failures": [vars(failure) for failure in failures(runs)],
+        "rows": {row.name: _row_facts(row) | scored.get(row.name, _UNSCORED) for run in runs for row in run.rows},
+        "metrics": records,
+        "findings": finding_records(material.findings),
+    }
+
+
+def _bare(run: Run) -> dict[str, Any]:
+    return run.record.model_dump(mode="json", exclude={"rows"})
+
+
+def _row_facts(row: Row) -> dict[str, Any]:
+    return row.record.model_dump(mode="json", exclude={"results"}) | {
+        "failures": row.failures,
+        "results": [_result_record(result) for result in row.results],
+    }
+
+
+def _result_record(result: Result) -> dict[str, Any]:
+    """Take all of a result's record but its windows, which `windows.csv` lists once for all rows."""
+    left_out = {"format_version", "windows", "log_digests"}
+    return result.record.model_dump(mode="json", exclude=left_out) | {"window_count": len(result.record.windows)}
+
+
+def summary_frame(records: Records) -> pd.DataFrame:
+    """Return one line for every figure of `division_records`."""
+    lines = [
+        {**place, "row": name, **record, "column": column, "cells": record["cells"][column]}
+        | record["scores"][column]
+        | {_DIFFERENCE[key]: value for key, value in record["differences"].get(column, {}).items()}
+        for place, region in _regions(records)
+        for name, record in region.items()
+        for column in record["scores"]
+    ]
+    return pd.DataFrame(lines, columns=list(SUMMARY_COLUMNS))
+
+
+def seed_frame(everything: Everything) -> pd.DataFrame:
+    """Return one line for every figure of every row and seed."""
+    parts = [_seeds(entry, place) for place, scores in _regions(everything) for entry in scores.values()]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(FIGURE_COLUMNS))
+
+
+def division_records(everything: Everything) -> Records:
+    """Return every figure with its interval and its difference to the row's baseline, for machines."""
+    return {
+        metric: {
+            division: {
+                region: {name: _record(entry, scores) for name, entry in scores.items()}
+                for region, scores in parts.items()
+            }
+            for division, parts in divisions.items()
+        }
+        for metric, divisions in everything.items()
+    }
+
+
+def _regions(of: Mapping[str, Mapping[str, Mapping[str, T]]]) -> Iterator[tuple[dict[str, str], T]]:
+    for metric, by_division in of.items():
+        for division, parts in by_division.items():
+            for region, found in parts.items():
+                yield {"metric": metric, "division": division, "region": region}, found
+
+
+def _record(entry: RowScores, scores: Scores) -> dict[str, Any]:
+    other, columns = reference_scores(entry, scores), column_names(entry.metric)
+    return {
+        "windows": entry.windows,
+        "seeds": len(entry.results),
+        "cells": entry.cells,
+        "scores": {column: _estimate(entry.estimate(column)) for column in columns},
+        "reference": None if other is None else other.row.name,
+        "differences": {} if other is None else {column: _estimate(entry.minus(other, column)) for column in columns},
+    }
+
+
+def _estimate(estimate: Estimate) -> dict[str, float | None]:
+    return {name: finite(value) for name, value in vars(estimate).items()}
+
+
+def _seeds(entry: RowScores, place: dict[str, str]) -> pd.DataFrame:
+    columns = column_names(entry.metric)
+    seed = pd.array([result.record.seed for result in entry.results], dtype="Int64").repeat(len(columns))
+    frame = pd.DataFrame({"seed": seed, "column": list(columns) * len(entry.results), "value": entry.by_seed.ravel()})
+    cells = np.asarray(entry.metric.cells(entry.totals)).ravel()
+    return frame.assign(row=entry.row.name, **place, cells=cells, windows=entry.windows)[list(FIGURE_COLUMNS)]
