@@ -112,12 +112,6 @@ class _Scored:
             found[windows[i].recording].append(i)
         return found
 
-    @property
-    def place(self) -> GridPlace:
-        """Where the row's grids lie in the grid frame."""
-        spec = self.grid.spec
-        return GridPlace(spec.cell_m, spec.agent_row * spec.cell_m, spec.agent_column * spec.cell_m)
-
 
 def _row(record: results.RunRecord, name: str, run: Path) -> results.RowRecord:
     row = next((row for row in record.rows if row.name == name), None)
@@ -173,11 +167,7 @@ def _open_backdrop(record: results.RunRecord, scored: _Scored, name: str, logs: 
 
 
 class _Messages:
-    """The messages of one recording.
-
-    Raises:
-        LogError: the log lacks the frame of a target.
-    """
+    """The messages of one recording; a LogError says that the log lacks the frame of a target."""
 
     def __init__(self, scored: _Scored, name: str, backdrop: Backdrop | None) -> None:
         self._scored, self._backdrop = scored, backdrop
@@ -203,7 +193,8 @@ class _Messages:
         yield from self._backdrop.messages(self.first_ns, self.last_ns, shift_ns=shift_ns, grid_yaw_rad=yaw_rad)
 
     def _grids(self, shift_ns: int) -> Iterator[Outgoing]:
-        place, notes = self._scored.place, {"row": self._scored.row.name}
+        spec, notes = self._scored.grid.spec, {"row": self._scored.row.name}
+        place = GridPlace(spec.cell_m, spec.agent_row * spec.cell_m, spec.agent_column * spec.cell_m)
         for index, window in zip(self._indices, self._windows, strict=True):
             for topic, values, layer, known_ns in self._layers(index, window):
                 now_ns, publish_ns = window.target_stamp_ns + shift_ns, known_ns + shift_ns

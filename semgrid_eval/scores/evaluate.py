@@ -65,15 +65,8 @@ def evaluate(
         answer = _predict(model, seen)
         prediction, left_out = apply_mask(answer.prediction, seen.mask.cpu().numpy(), mask_mode)
         aligned = seen if windows.translate else replace(windows, translate=True).batch(chosen)
-        scored = ScoredWindows(
-            target=seen.target.cpu().numpy(),
-            prediction=prediction,
-            certainty=answer.certainty,
-            left_out=left_out,
-            inputs=aligned.past.cpu().numpy(),
-            actors=windows.actors(chosen),
-            spec=spec,
-        )
+        target, inputs, actors = seen.target.cpu().numpy(), aligned.past.cpu().numpy(), windows.actors(chosen)
+        scored = ScoredWindows(target, prediction, answer.certainty, left_out, inputs, actors, spec)
         parts.append(replace(answer, sums=count_windows(scored)))
         progress(min(start + batch, len(windows)), len(windows))
     return Evaluation(

@@ -172,11 +172,7 @@ def write_result(folder: Path, record: ResultRecord) -> None:
 
 
 def read_result(folder: Path) -> ResultRecord:
-    """Read a result's record and check that it belongs to its folder.
-
-    Raises:
-        InputError: it is missing, malformed, of another format version or under another id's name.
-    """
+    """Read a result's record; an InputError says that it is missing, malformed, or of another version or folder."""
     record = _record(ResultRecord, folder / RESULT_FILE)
     if record.id != folder.name:
         raise ResultError(f"belongs to another folder than {folder.name}", path=folder / RESULT_FILE, field="id")

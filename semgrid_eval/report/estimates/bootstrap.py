@@ -133,11 +133,7 @@ class RowScores:
         return weighted_sum([(1, self)], column)
 
     def minus(self, other: "RowScores", column: str) -> Estimate:
-        """Return the paired difference to another row.
-
-        Raises:
-            ValueError: the rows have other targets.
-        """
+        """Return the paired difference to another row; a ValueError says that its targets are others."""
         return weighted_sum([(1, self), (-1, other)], column)
 
 
@@ -150,18 +146,19 @@ Everything = Mapping[str, Mapping[str, Parts]]
 
 
 def weighted_sum(parts: Sequence[tuple[float, RowScores]], column: str) -> Estimate:
-    """Add up rows' scores by their weights, draw by draw.
-
-    Raises:
-        ValueError: the rows have other targets.
-    """
+    """Add up rows' scores by their weights, draw by draw; a ValueError says that their targets differ."""
     first = parts[0][1]
     for _, entry in parts:
         if not comparable(first.row, entry.row):
             raise ValueError(f"{first.row.name} and {entry.row.name} are scored on other targets")
     at = column_names(first.metric).index(column)
     value = sum(weight * entry.mean[column] for weight, entry in parts)
-    return _estimate(value, np.sum([weight * entry.draws[:, at] for weight, entry in parts], axis=0))
+    draws = np.sum([weight * entry.draws[:, at] for weight, entry in parts], axis=0)
+    finite = draws[np.isfinite(draws)]
+    if not np.isfinite(value) or len(finite) == 0:
+        return Estimate(value, np.nan, np.nan)
+    low, high = np.quantile(finite, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return Estimate(value, float(low), float(high))
 
 
 def score_all(rows: Sequence[Row], divisions: Sequence[Division], resampling: Resampling) -> Everything:
@@ -200,11 +197,3 @@ def _score_row(row: Row, sums: RowSums, metric: Metric, names: Sequence[str], dr
     resampled = draws.over_seeds(metric.figures(draws.resampled(sums.by_recording(names))))
     results = tuple(part.result for part in sums.parts)
     return RowScores(row, metric, results, by_seed, resampled, sums.totals, sums.windows)
-
-
-def _estimate(value: float, draws: Floats) -> Estimate:
-    finite = draws[np.isfinite(draws)]
-    if not np.isfinite(value) or len(finite) == 0:
-        return Estimate(value, np.nan, np.nan)
-    low, high = np.quantile(finite, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return Estimate(value, float(low), float(high))

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from semgrid_eval.errors import SemgridError
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.report.examples.choose import Contest, Pick, choose, choose_by_class, contests
 from semgrid_eval.report.examples.panels import Example, Shown, draw_examples
 from semgrid_eval.report.examples.thumbnails import RunThumbnails
@@ -86,7 +87,8 @@ def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
 
 def widths(rows: Sequence[Row]) -> str:
     """Say how wide the grids of rows are."""
-    widths_m = {spec.columns * spec.cell_m for spec in (row.shown.spec for row in rows)}
+    specs = ((row.shown.grid or GridConfig()).spec for row in rows)
+    widths_m = {spec.columns * spec.cell_m for spec in specs}
     return " or ".join(f"{width_m:g} m" for width_m in sorted(widths_m))
 
 

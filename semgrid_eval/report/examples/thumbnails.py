@@ -135,10 +135,8 @@ def blind_cells(
 ) -> NDArray[np.bool_] | None:
     """Flag the blind cells of a window in the target's place: (H, W).
 
-    The ground is taken as flat, so this says where ground is seen, not how far walls and cars reach into view.
-
-    Returns:
-        None where an input sensor is not a part of the shown camera's image, or inputs have other times than frames.
+    The ground is taken as flat, so this says where ground is seen, not how far walls and cars reach into view. None
+    where an input sensor is not a part of the shown camera's image, or inputs have other times than frames.
     """
     parts = parts_of_shown(grid)
     place = {int(stamp): frame for frame, stamp in enumerate(track.stamps_ns)}

@@ -57,7 +57,8 @@ def lay_out(scores: Scores) -> list[Group]:
     questions = by_question([entry.row for entry in scores.values()])
     for rows in questions:
         ordered = sorted(rows, key=lambda row: not row.is_baseline)
-        groups.append(Group(_words(rows[0], questions[0][0]), {row.name: at + i for i, row in enumerate(ordered)}))
+        words = ", ".join(_differences(rows[0], questions[0][0])) or ", ".join(_differences(rows[0], None))
+        groups.append(Group(words, {row.name: at + i for i, row in enumerate(ordered)}))
         at += len(rows) + _GAP
     return groups
 
@@ -99,12 +100,8 @@ def _name_rows(axes: Axes, groups: Sequence[Group]) -> None:
         axes.annotate(group.words, at, (2, 0), textcoords="offset points", va="center", color=style.MUTED, fontsize=7)
 
 
-def _words(row: Row, first: Row) -> str:
-    """Say what a question asks, as far as it is not what the first one asks."""
-    return ", ".join(_differences(row, first)) or ", ".join(_differences(row, None))
-
-
 def _differences(row: Row, first: Row | None) -> Iterator[str]:
+    """Say what a row's question asks, as far as it is not what the first one asks."""
     mine, theirs = row.record.facts, None if first is None else first.record.facts
     if theirs is None or mine.inputs != theirs.inputs:
         yield f"{mine.inputs} input{'' if mine.inputs == 1 else 's'}"

@@ -19,24 +19,18 @@ COLUMNS = ("figure", "row", "setting", "value", "by", "by_value", "parameters", 
 _ASIDE = 0.02  # of the axis: how far lines stand apart, so that their intervals can be told apart
 _MOST_SETS = 4
 _LEFT_OUT = "horizon_steps"  # scores over the lead time have a figure of their own
-Keys = tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Varied:
     """Rows that differ in the numeric settings `keys` alone, the first of which is drawn along the axis."""
 
-    keys: Keys
+    keys: tuple[str, ...]
     rows: tuple[RowScores, ...]
 
     def value(self, entry: RowScores, at: int = 0) -> Any:  # noqa: ANN401 - whichever number a setting is
         """Return a row's value of a setting; nothing where there is only one setting."""
         return settings_of(entry.row)[self.keys[at]] if at < len(self.keys) else None
-
-    @property
-    def reach(self) -> float:
-        """From the smallest to the largest value of the first setting."""
-        return float(np.ptp([self.value(entry) for entry in self.rows]))
 
     def lines(self) -> list[list[RowScores]]:
         """Return the rows of each value of the second setting, ordered by the first."""
@@ -87,7 +81,8 @@ def _draw_line(panels: Sequence[Axes], varied: Varied, line: list[RowScores], in
     """Draw the rows of one value of the second setting into the panels of score, time and both."""
     score, time, front = panels
     colour, label = PALETTE[index % len(PALETTE)], _label(varied, line[0])
-    places = [varied.value(entry) + aside * _ASIDE * varied.reach for entry in line]
+    reach = float(np.ptp([varied.value(entry) for entry in varied.rows]))
+    places = [varied.value(entry) + aside * _ASIDE * reach for entry in line]
     estimates, times = [entry.estimate(HEADLINE) for entry in line], [_window_ms(entry) for entry in line]
     for axes, x in ((score, places), (front, times)):
         for at, estimate in zip(x, estimates, strict=True):

@@ -28,7 +28,7 @@ from semgrid_eval.report.figures.curves import calibration_frame, training_frame
 from semgrid_eval.report.figures.settings import settings_frame
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
-from semgrid_eval.report.rows.load import Result, Row, Run
+from semgrid_eval.report.rows.load import Row, Run
 from semgrid_eval.report.tables.formats.csv import as_csv, frame_csv
 from semgrid_eval.report.tables.formats.json import as_json
 from semgrid_eval.report.tables.formats.latex import as_latex
@@ -151,16 +151,11 @@ def _bare(run: Run) -> dict[str, Any]:
 
 
 def _row_facts(row: Row) -> dict[str, Any]:
-    return row.record.model_dump(mode="json", exclude={"results"}) | {
-        "failures": row.failures,
-        "results": [_result_record(result) for result in row.results],
-    }
-
-
-def _result_record(result: Result) -> dict[str, Any]:
-    """Take all of a result's record but its windows, which `windows.csv` lists once for all rows."""
-    left_out = {"format_version", "windows", "log_digests"}
-    return result.record.model_dump(mode="json", exclude=left_out) | {"window_count": len(result.record.windows)}
+    left_out = {"format_version", "windows", "log_digests"}  # `windows.csv` lists windows once for all rows
+    records = [each.record for each in row.results]
+    results = [each.model_dump(mode="json", exclude=left_out) | {"window_count": len(each.windows)} for each in records]
+    facts = row.record.model_dump(mode="json", exclude={"results"})
+    return facts | {"failures": row.failures, "results": results}
 
 
 def summary_frame(records: Records) -> pd.DataFrame:

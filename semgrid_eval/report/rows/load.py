@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, SemgridError
-from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores import results as files
 
@@ -50,11 +50,6 @@ class Result:
             return parse_config(GridConfig, self.record.config["grid"])
         except (KeyError, ConfigError):
             return None
-
-    @property
-    def spec(self) -> GridSpec:
-        """The extent of its grids, the default one where it does not tell."""
-        return GridSpec() if self.grid is None else self.grid.spec
 
     @cached_property
     def settings(self) -> Mapping[str, Any]:

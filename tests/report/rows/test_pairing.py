@@ -8,7 +8,7 @@ from support.scoring import score_rows
 
 from semgrid_eval.report.estimates.bootstrap import Estimate
 from semgrid_eval.report.page.provenance import failures
-from semgrid_eval.report.page.summary import summarise
+from semgrid_eval.report.page.write import summarise
 from semgrid_eval.report.rows.load import Run, load_runs
 from semgrid_eval.report.rows.pairing import comparable, headline, reference_of, verdict
 from semgrid_eval.scores.results import NOT_RUN
