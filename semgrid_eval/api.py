@@ -165,7 +165,7 @@ def make_model(
     made = find_model(model) if isinstance(model, str) else model
     rows, columns = windows.data.grids.shape[-2:]
     given = Given(windows.sensors, windows.inputs.shape[1], rows, columns, windows.data.cell_m, windows.translate)
-    chosen = parse_config(made.Settings, dict(settings or {}), path="settings")
+    chosen = made.parse_settings(dict(settings or {}), path="settings")
     made.check(chosen, given)
     return seeded_network(made, chosen, given, seed) if issubclass(made, Network) else made(chosen, given)
 

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.config import Config
+from semgrid_eval.config import Config, parse_config
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 
@@ -69,6 +69,15 @@ class Model:
     def __init__(self, settings: Any, given: Given) -> None:  # noqa: ANN401 - of the class `Settings`
         super().__init__()
         self.settings, self.given = settings, given
+
+    @classmethod
+    def parse_settings(cls, values: object, *, path: str | None = None) -> Config:
+        """Complete what a row sets.
+
+        Raises:
+            ConfigError: it is not this model's.
+        """
+        return parse_config(cls.Settings, values, path=path)
 
     @classmethod
     def in_words(cls, settings: Any) -> str:  # noqa: ANN401 - of the class `Settings`

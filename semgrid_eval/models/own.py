@@ -101,6 +101,11 @@ class _Guarded(Model):
             return scores
 
     @classmethod
+    def parse_settings(cls, values: object, *, path: str | None = None) -> Config:
+        with cls._guard():
+            return super().parse_settings(values, path=path)
+
+    @classmethod
     def in_words(cls, settings: Any) -> str:  # noqa: ANN401 - of the class `Settings`
         with cls._guard():
             return super().in_words(settings)

@@ -4,7 +4,7 @@ from typing import Any, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from semgrid_eval.config import Config, parse_config
+from semgrid_eval.config import Config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.model import Given, Model
@@ -61,7 +61,7 @@ class Row(Config):
         if not (model := _found(info.data.get("model", ""))):
             return settings
         try:
-            return parse_config(model.Settings, settings).model_dump(mode="json")
+            return model.parse_settings(settings).model_dump(mode="json")
         except ConfigError as error:
             raise ConfigError(f"settings.{error}".replace("settings.(top level)", "settings")) from None
 
@@ -100,7 +100,7 @@ class Row(Config):
         Raises:
             ConfigError: they are not this model's.
         """
-        return parse_config(model.Settings, self.settings)
+        return model.parse_settings(self.settings)
 
     def identity(self) -> dict[str, object]:
         """Return what determines the row's numbers, besides code and logs: all but its name and repeats."""

@@ -19,6 +19,7 @@ from semgrid_eval.windows.plan import Window
 
 OWN_MODELS = """
 import torch
+from pydantic import field_validator
 from semgrid_eval.config import Config
 from semgrid_eval.models.model import Model, one_hot
 from semgrid_eval.models.network import Network, input_planes
@@ -54,6 +55,15 @@ class Silent(Model):
     @classmethod
     def check(cls, settings, given):
         settings.unheard_of
+
+class Looking(Model):
+    class Settings(Config):
+        table: str = "small"
+
+        @field_validator("table")
+        @classmethod
+        def _known(cls, table):
+            return {"small": table}[table]
 
 class Untyped(Model):
     class Settings:
@@ -132,6 +142,13 @@ def test_installed_entry_point_is_a_model(monkeypatch, batch):
 def test_what_is_no_model_is_named(own, name, message):
     with pytest.raises(InputError, match=message):
         find_model(f"{own}:{name}")
+
+
+def test_validator_that_raises_is_named(own):
+    looking = find_model(f"{own}:Looking")
+    assert looking.parse_settings({}).table == "small"
+    with pytest.raises(InputError, match=r"own_models\.py:Looking: raised KeyError: 'large'$"):
+        looking.parse_settings({"table": "large"})
 
 
 def test_model_that_cannot_be_made_or_fitted_is_named(own, batch):
