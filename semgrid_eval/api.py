@@ -24,8 +24,7 @@ from semgrid_eval.models.network import Network, seeded_network
 from semgrid_eval.models.registry import find_model
 from semgrid_eval.models.training import train
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.runner import run_matrix
-from semgrid_eval.runs.units import RunOptions
+from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores.metrics.iou import confusion
 from semgrid_eval.scores.metrics.metric import column_names
 from semgrid_eval.scores.metrics.table import IOU

@@ -25,17 +25,12 @@ class Category(IntEnum):
 
 @dataclass(frozen=True)
 class GridClass:
-    """One class of the grid: its id is its index in `CLASSES`.
-
-    Args:
-        colour: the paper's, sRGB.
-        safe_colour: far from the others for readers with any kind of colour blindness; the paper's reds and greens
-            are not.
-    """
+    """One class of the grid: its id is its index in `CLASSES`."""
 
     name: str
     category: Category
-    colour: tuple[int, int, int]
+    colour: tuple[int, int, int]  # the paper's, sRGB
+    # Far from the others for readers with any kind of colour blindness; the paper's reds and greens are not.
     safe_colour: tuple[int, int, int]
 
 

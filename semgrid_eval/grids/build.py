@@ -19,9 +19,8 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.motion import EgoMotion
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.sensors.kinds import read_points
+from semgrid_eval.sensors.kinds import Snapshot, read_points, synchronise
 from semgrid_eval.sensors.sensor import Points
-from semgrid_eval.sensors.synchronise import Snapshot, synchronise
 
 
 @dataclass

@@ -57,24 +57,18 @@ def paper_sensors() -> dict[str, SensorConfig]:
 
 
 class GridConfig(Config):
-    """Everything that determines a grid data set, besides the logs.
+    """Everything that determines a grid data set, besides the logs."""
 
-    Args:
-        spec: extent of the grids.
-        sensors: settings by name; a `kind` is a camera where it is left out.
-        target: the sensors whose points, counted together, make the targets. The times of the first are the grids'.
-        integrator: of the egomotion; euler as the paper, arc for constant turn and speed between samples (reading 17).
-        morphology: reading 12.
-        stretch_frames: length of a recording; longer logs are cut (reading 18).
-        class_map: grid class, or none, by Cityscapes label name; replaces single entries of the default (reading 21).
-    """
-
-    spec: GridSpec = GridSpec()
+    spec: GridSpec = GridSpec()  # extent of the grids
+    # Settings by name; a `kind` is a camera where it is left out.
     sensors: dict[SensorName, Sensor] = Field(default_factory=paper_sensors)
+    # The sensors whose points, counted together, make the targets. The times of the first are the grids'.
     target: tuple[str, ...] = Field(("full",), min_length=1)
+    # Of the egomotion; euler as the paper, arc for constant turn and speed between samples (reading 17).
     integrator: Integrator = "euler"
-    morphology: Morphology = "minkowski"
-    stretch_frames: int = Field(30, ge=2, le=100_000)
+    morphology: Morphology = "minkowski"  # reading 12
+    stretch_frames: int = Field(30, ge=2, le=100_000)  # length of a recording; longer logs are cut (reading 18)
+    # Grid class, or none, by Cityscapes label name; replaces single entries of the default (reading 21).
     class_map: dict[str, str | None] = Field(default_factory=dict)
 
     @model_validator(mode="after")

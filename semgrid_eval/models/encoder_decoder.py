@@ -18,19 +18,12 @@ DROPOUT_RATE = 0.5
 
 
 class EncoderDecoderSettings(NetworkSettings):
-    """Settings of an ED.
+    """Settings of an ED."""
 
-    Args:
-        depth: encoder blocks, d.
-        features: channels of the first block, f.
-        decoder_activation: of the decoder's convolutions (reading 5).
-        constants: whose constants batch normalisation and initial weights follow (reading 7).
-    """
-
-    depth: int = Field(default=3, ge=2, le=6)
-    features: int = Field(default=64, ge=2, le=512)
-    decoder_activation: Activation = "linear"
-    constants: Constants = "keras"
+    depth: int = Field(default=3, ge=2, le=6)  # encoder blocks, d
+    features: int = Field(default=64, ge=2, le=512)  # channels of the first block, f
+    decoder_activation: Activation = "linear"  # of the decoder's convolutions (reading 5)
+    constants: Constants = "keras"  # whose constants batch normalisation and initial weights follow (reading 7)
 
     @field_validator("features")
     @classmethod

@@ -13,22 +13,14 @@ from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 @dataclass(frozen=True)
 class Given:
-    """What a row gives its model, whatever the logs hold.
+    """What a row gives its model, whatever the logs hold."""
 
-    Args:
-        sensors: names of the inputs' sensors, in the order of S.
-        inputs: grids of each sensor, T.
-        rows: of a grid, H, and `columns` W.
-        cell_m: edge of a cell.
-        translate: whether inputs are moved into the target's place.
-    """
-
-    sensors: tuple[str, ...]
-    inputs: int
-    rows: int
+    sensors: tuple[str, ...]  # names of the inputs' sensors, in the order of S
+    inputs: int  # grids of each sensor, T
+    rows: int  # of a grid, H, and `columns` W
     columns: int
-    cell_m: float
-    translate: bool
+    cell_m: float  # edge of a cell
+    translate: bool  # whether inputs are moved into the target's place
 
     @property
     def grids(self) -> int:

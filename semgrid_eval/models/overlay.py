@@ -25,12 +25,9 @@ def newest_first(batch: WindowBatch) -> Tensor:
 
 
 class OverlaySettings(Config):
-    """Settings of BL-Sp.
+    """Settings of BL-Sp."""
 
-    Args:
-        top: part of the name of the one sensor that is drawn over the others (reading 20).
-    """
-
+    # Part of the name of the one sensor that is drawn over the others (reading 20).
     top: str = Field("upper", min_length=1)
 
 

@@ -24,15 +24,11 @@ SCORING_VERSION = 3
 
 @dataclass(frozen=True)
 class Resolved:
-    """The model of a row with its settings.
-
-    Args:
-        version: tells its code, and files that it declares, from others of the same name.
-    """
+    """The model of a row with its settings."""
 
     model: type[Model]
     settings: Config
-    version: str
+    version: str  # tells its code, and files that it declares, from others of the same name
 
     @property
     def is_known(self) -> bool:
@@ -42,40 +38,27 @@ class Resolved:
 
 @dataclass(frozen=True)
 class Training:
-    """What a row's model learns from; rows that ask for the same share it.
-
-    Args:
-        folder: of a network's weights and history.
-        watched: the windows whose loss a network's training notes.
-    """
+    """What a row's model learns from; rows that ask for the same share it."""
 
     id: str
-    folder: Path
+    folder: Path  # of a network's weights and history
     windows: WindowSet
-    watched: WindowSet | None
+    watched: WindowSet | None  # the windows whose loss a network's training notes
 
 
 @dataclass(frozen=True)
 class Job:
-    """A row with one seed, resolved.
-
-    Args:
-        result_id: names the result's folder.
-        config: what determined it, for the record.
-        scored: validation windows; `windows_id` names their file.
-        training: what is learned from, if anything.
-        left_out: logs whose recordings are too short for the row's windows, and by how much.
-    """
+    """A row with one seed, resolved."""
 
     row: Row
     seed: int | None
     resolved: Resolved
-    result_id: str
-    config: dict[str, object]
-    scored: WindowSet
+    result_id: str  # names the result's folder
+    config: dict[str, object]  # what determined it, for the record
+    scored: WindowSet  # validation windows; `windows_id` names their file
     windows_id: str
-    training: Training | None
-    left_out: dict[str, str]
+    training: Training | None  # what is learned from, if anything
+    left_out: dict[str, str]  # logs whose recordings are too short for the row's windows, and by how much
 
 
 def resolve(row: Row) -> Resolved:

@@ -31,21 +31,16 @@ class _Axes(Config):
 
 
 class _MatrixFile(Config):
-    """What a matrix file may hold.
+    """What a matrix file may hold."""
 
-    Args:
-        extends: a preset, or a file beside this one, whose rows, defaults, models and seed this one starts from.
-            Defaults and models are merged key by key; so is a row into the base's row of the same written name; other
-            rows come after those.
-        without: written names of the base's rows to leave out.
-        title: the name of the file if not given, also where it extends another.
-        models: settings of models by name, under those of every row of that model.
-    """
-
+    # A preset, or a file beside this one, whose rows, defaults, models and seed this one starts from. Defaults and
+    # models are merged key by key; so is a row into the base's row of the same written name; other rows come after
+    # those.
     extends: str | None = None
-    without: list[str] = Field(default_factory=list)
-    title: str = Field("", max_length=200)
+    without: list[str] = Field(default_factory=list)  # written names of the base's rows to leave out
+    title: str = Field("", max_length=200)  # the name of the file if not given, also where it extends another
     seed: int | None = Field(None, ge=0)
+    # Settings of models by name, under those of every row of that model.
     models: dict[str, dict[str, Any]] = Field(default_factory=dict)
     defaults: dict[str, Any] = Field(default_factory=dict)
     rows: list[dict[str, Any]] = Field(default_factory=list)

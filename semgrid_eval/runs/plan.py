@@ -14,8 +14,8 @@ from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.runs.job import Job, Training
 from semgrid_eval.runs.matrix import Matrix
-from semgrid_eval.runs.runner import failure_of, make_worker
-from semgrid_eval.runs.units import RunOptions, Unit, plan_units, units_of, wanted_rows
+from semgrid_eval.runs.row import Unit, plan_units, units_of
+from semgrid_eval.runs.runner import RunOptions, failure_of, make_worker, wanted_rows
 from semgrid_eval.runs.worker import Worker
 
 SAMPLE = {"epochs": 3, "updates_per_epoch": 4, "epoch_unit": "batches", "schedule": ScheduleConfig()}
@@ -26,24 +26,16 @@ SCORING_SHARE = 0.4
 
 @dataclass(frozen=True)
 class PlannedUnit:
-    """A row with one seed.
+    """A row with one seed."""
 
-    Args:
-        rows: names of the rows that share it.
-        updates: still to be made, 0 where nothing is left to train or a unit before it trains the same.
-        samples: windows to be seen by them.
-        seconds: estimated; 0 where the result or the training is there already.
-        failure: why it cannot be run.
-    """
-
-    rows: tuple[str, ...]
+    rows: tuple[str, ...]  # names of the rows that share it
     seed: int | None
     windows: int
-    updates: int
-    samples: int
-    seconds: float
+    updates: int  # still to be made, 0 where nothing is left to train or a unit before it trains the same
+    samples: int  # windows to be seen by them
+    seconds: float  # estimated; 0 where the result or the training is there already
     done: bool
-    failure: str | None = None
+    failure: str | None = None  # why it cannot be run
 
 
 def plan_run(

@@ -15,8 +15,7 @@ import torch
 import semgrid_eval
 from semgrid_eval.packages import installed_versions
 from semgrid_eval.runs.matrix import Matrix
-from semgrid_eval.runs.row import Row
-from semgrid_eval.runs.units import units_of
+from semgrid_eval.runs.row import Row, units_of
 from semgrid_eval.runs.worker import Worker
 from semgrid_eval.scores import results
 

@@ -1,11 +1,13 @@
-"""One row of a matrix: an experiment with everything that determines it, and what it says of itself."""
+"""A row of a matrix: an experiment with everything that determines it; with one seed, it is a unit of a run."""
 
-from typing import Any, Self
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from semgrid_eval.config import Config
 from semgrid_eval.errors import ConfigError, InputError
+from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.own import installed_models
@@ -28,31 +30,23 @@ def _found(model: str) -> type[Model] | None:
 
 
 class Row(Config):
-    """One experiment with everything that determines it.
+    """One experiment with everything that determines it."""
 
-    Args:
-        name: unique in the matrix, like `ED-Sp2`; axes fill in `{key}` places.
-        model: name of a built-in or installed model, or `path.py:Class` of one's own.
-        settings: of the model, complete unless its code cannot be loaded.
-        sensors: inputs, from the grid config's sensors; those of its target if not given.
-        translate: whether inputs are moved to the target's time (T2); the paper's NT rows do not.
-        mask_mode: what becomes of the mask M in scores (reading 9).
-        repeats: seeds of a model in which chance plays a part.
-        validation_window: where it differs from `window`, for recordings of another frame rate; what a file leaves out
-            is as in `window`, and the number of inputs has to be.
-    """
-
-    name: str = Field(min_length=1, max_length=200)
-    model: str
+    name: str = Field(min_length=1, max_length=200)  # unique in the matrix, like `ED-Sp2`; axes fill in `{key}` places
+    model: str  # name of a built-in or installed model, or `path.py:Class` of one's own
+    # Of the model, complete unless its code cannot be loaded.
     settings: dict[str, Any] = Field(default_factory=dict, validate_default=True)
     grid: GridConfig = GridConfig()
+    # Inputs, from the grid config's sensors; those of its target if not given.
     sensors: tuple[str, ...] = Field(default_factory=_target_sensors, min_length=1)
-    translate: bool = True
-    mask_mode: MaskMode = "exclude"
-    repeats: int = Field(1, ge=1, le=1000)
+    translate: bool = True  # whether inputs are moved to the target's time (T2); the paper's NT rows do not
+    mask_mode: MaskMode = "exclude"  # what becomes of the mask M in scores (reading 9)
+    repeats: int = Field(1, ge=1, le=1000)  # seeds of a model in which chance plays a part
     train_split: str = "train"
     validation_split: str = "val"
     window: WindowConfig = WindowConfig()
+    # Where it differs from `window`, for recordings of another frame rate; what a file leaves out is as in `window`,
+    # and the number of inputs has to be.
     validation_window: WindowConfig | None = None
 
     @field_validator("settings")
@@ -134,3 +128,27 @@ class Row(Config):
             f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead",
         ]
         return f"{self.name} ({', '.join(parts)})"
+
+
+class Unit(NamedTuple):
+    """A row with one seed; `seed` is None where chance plays no part."""
+
+    row: Row
+    seed: int | None
+
+
+def plan_units(rows: Iterable[Row], first_seed: int) -> dict[str, Unit]:
+    """List the distinct units of rows by key; rows that mean the same share them."""
+    units: dict[str, Unit] = {}
+    for row in rows:
+        for key, unit in units_of(row, first_seed):
+            units.setdefault(key, unit)
+    return units
+
+
+def units_of(row: Row, first_seed: int) -> Iterator[tuple[str, Unit]]:
+    """Return the units of a row with the keys by which rows that mean the same share them."""
+    model = row.found_model()
+    seeds = range(first_seed, first_seed + row.repeats) if model and model.random else [None]
+    for seed in seeds:
+        yield digest_value([row.identity(), seed]), Unit(row, seed)

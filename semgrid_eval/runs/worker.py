@@ -42,24 +42,16 @@ class Worker:
     """Fits and scores single units; holds the grids that they share.
 
     Its methods raise a `SemgridError` where a row cannot be run; the message says why.
-
-    Args:
-        out: folder of the run, and `trainings` that of the trainings.
-        training_data: the grids to train on, and `scored_data` those to score on, mostly the same.
-        device: where models run.
-        threads: of numeric libraries where the units are worked on, which may be another process.
-        example_seed: of the results whose predictions are kept for a report's examples.
-        stage: shows progress.
     """
 
-    out: Path
+    out: Path  # folder of the run, and `trainings` that of the trainings
     trainings: Path
-    training_data: RunData
+    training_data: RunData  # the grids to train on, and `scored_data` those to score on, mostly the same
     scored_data: RunData
-    device: torch.device
-    threads: int
-    example_seed: int
-    stage: Stage
+    device: torch.device  # where models run
+    threads: int  # of numeric libraries where the units are worked on, which may be another process
+    example_seed: int  # of the results whose predictions are kept for a report's examples
+    stage: Stage  # shows progress
     _selected: dict[object, tuple[WindowSet, dict[int, str]]] = field(default_factory=dict, init=False)
     # Ids of the windows that are known to lie in the run's folder.
     _kept: set[str] = field(default_factory=set, init=False)

@@ -21,20 +21,14 @@ _SIZE_PX = (16, 8192)
 
 
 class CameraSensor(SensorConfig):
-    """A rectangle of a camera's image, in pixels of the resized image, ends exclusive.
-
-    Args:
-        camera: its name in the log; None takes a log's only one.
-        image_size_px: width and height to which labels and disparity are brought before projection (reading 22).
-        top_px: first row, and `left_px` first column.
-        bottom_px: end of the rows, and `right_px` of the columns; None reaches to the edge.
-    """
+    """A rectangle of a camera's image, in pixels of the resized image, ends exclusive."""
 
     kind: Literal["camera"] = "camera"
-    camera: str | None = None
+    camera: str | None = None  # its name in the log; None takes a log's only one
+    # Width and height to which labels and disparity are brought before projection (reading 22).
     image_size_px: tuple[int, int] = (512, 256)
-    top_px: int = Field(0, ge=0)
-    bottom_px: int | None = None
+    top_px: int = Field(0, ge=0)  # first row, and `left_px` first column
+    bottom_px: int | None = None  # end of the rows, and `right_px` of the columns; None reaches to the edge
     left_px: int = Field(0, ge=0)
     right_px: int | None = None
 

@@ -11,47 +11,32 @@ from torch import Tensor
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import DIGEST_CHARACTERS
-from semgrid_eval.windows.grids import GridData
+from semgrid_eval.windows.grids import GridData, covered_without_truth, shift_grids, shift_in_cells
 from semgrid_eval.windows.plan import Window
-from semgrid_eval.windows.shift import covered_without_truth, shift_grids, shift_in_cells
 
 
 @dataclass(frozen=True)
 class WindowBatch:
-    """What a predictor sees of B windows, and what it is scored on.
+    """What a predictor sees of B windows, and what it is scored on."""
 
-    Args:
-        past: (B, S, T, H, W) uint8 class ids, oldest first; in the target's place if the row translates, else as seen.
-        sensors: names along S.
-        shift_cells: (B, T, 2) int64 rows and columns by which ego motion moves each input into the target's place.
-        lead_s: (B, T) float32 time from each input to the target.
-        target: (B, H, W) uint8.
-        mask: (B, H, W) bool, M: seen in an aligned input, yet unknown in the target.
-    """
-
+    # (B, S, T, H, W) uint8 class ids, oldest first; in the target's place if the row translates, else as seen.
     past: Tensor
-    sensors: tuple[str, ...]
-    shift_cells: Tensor
-    lead_s: Tensor
-    target: Tensor
-    mask: Tensor
+    sensors: tuple[str, ...]  # names along S
+    shift_cells: Tensor  # (B, T, 2) int64 rows and columns by which ego motion moves each input into the target's place
+    lead_s: Tensor  # (B, T) float32 time from each input to the target
+    target: Tensor  # (B, H, W) uint8
+    mask: Tensor  # (B, H, W) bool, M: seen in an aligned input, yet unknown in the target
 
 
 @dataclass(frozen=True)
 class WindowSet:
-    """N windows over grid data; frames are indices along F.
-
-    Args:
-        inputs: (N, T) int64; target_frames: (N,) int64; shift_cells: (N, T, 2) int64; lead_s: (N, T) float32.
-        sensor_rows: (S,) int64 where the input sensors lie in the data.
-        translate: whether inputs are moved into the target's place.
-    """
+    """N windows over grid data; frames are indices along F."""
 
     data: GridData
     sensors: tuple[str, ...]
-    sensor_rows: Tensor
-    translate: bool
-    inputs: Tensor
+    sensor_rows: Tensor  # (S,) int64 where the input sensors lie in the data
+    translate: bool  # whether inputs are moved into the target's place
+    inputs: Tensor  # (N, T) int64; target_frames: (N,) int64; shift_cells: (N, T, 2) int64; lead_s: (N, T) float32
     target_frames: Tensor
     shift_cells: Tensor
     lead_s: Tensor

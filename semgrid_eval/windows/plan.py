@@ -11,15 +11,12 @@ from semgrid_eval.errors import InputError
 
 
 class WindowConfig(Config):
-    """n inputs, `step_frames` frames apart, and a target `horizon_steps` steps after the last of them.
-
-    Args:
-        target_frame: index of the one target of each validation recording; None takes every possible target.
-    """
+    """n inputs, `step_frames` frames apart, and a target `horizon_steps` steps after the last of them."""
 
     inputs: int = Field(default=2, ge=1)
     step_frames: int = Field(default=5, ge=1)
     horizon_steps: int = Field(default=1, ge=1)
+    # Index of the one target of each validation recording; None takes every possible target.
     target_frame: int | None = Field(default=25, ge=0)
 
     @property

@@ -3,8 +3,8 @@ from itertools import chain
 import numpy as np
 import pytest
 
+from semgrid_eval.sensors.kinds import TOLERANCE_NS, synchronise
 from semgrid_eval.sensors.sensor import Points, SensorConfig
-from semgrid_eval.sensors.synchronise import TOLERANCE_NS, synchronise
 
 MS = 1_000_000
 
