@@ -74,15 +74,8 @@ def measure_prediction(settings: Settings, device: torch.device) -> Iterator[Mea
 
 
 def _textbook_rate(config: EncoderDecoderSettings, settings: Settings, device: torch.device) -> float:
-    # The first epoch warms up.
-    seconds = train_by_the_book(
-        config,
-        random_windows(),
-        batch=settings.batch,
-        updates=settings.updates,
-        epochs=settings.repeats + 1,
-        device=device,
-    )
+    size = {"batch": settings.batch, "updates": settings.updates, "epochs": settings.repeats + 1}
+    seconds = train_by_the_book(config, random_windows(), device=device, **size)  # the first epoch warms up
     return settings.updates * settings.batch / median(seconds[1:])
 
 

@@ -19,9 +19,9 @@ _ALONG_FRAMES = {"stamps_ns": 0, "grids": 1, "position_m": 0, "yaw_rad": 0}
 class GridRecording:
     """The grids of one recording, all in the orientation of its first frame (reading 18)."""
 
-    name: str  # of the recording; the stretches of a longer log are told apart by `#1`, `#2`, ..
-    log: str  # path of its log, and `digest` that of its bytes
-    digest: str
+    name: str  # of the recording; the stretches of a longer log are told apart by `#1`, `#2`, ...
+    log: str  # path of its log
+    digest: str  # of the log's bytes
     split: str  # `train`, `val` or `test`
     dataset: str  # where it comes from
     sensors: tuple[str, ...]  # names, in the order of `grids`; a target of several sensors is one of them

@@ -60,12 +60,10 @@ class GridConfig(Config):
     """Everything that determines a grid data set, besides the logs."""
 
     spec: GridSpec = GridSpec()  # extent of the grids
-    # Settings by name; a `kind` is a camera where it is left out.
-    sensors: dict[SensorName, Sensor] = Field(default_factory=paper_sensors)
+    sensors: dict[SensorName, Sensor] = Field(default_factory=paper_sensors)  # cameras where `kind` is left out
     # The sensors whose points, counted together, make the targets. The times of the first are the grids'.
     target: tuple[str, ...] = Field(("full",), min_length=1)
-    # Of the egomotion; euler as the paper, arc for constant turn and speed between samples (reading 17).
-    integrator: Integrator = "euler"
+    integrator: Integrator = "euler"  # of the egomotion, as in the paper; `EgoMotion` has the other (reading 17)
     morphology: Morphology = "minkowski"  # reading 12
     stretch_frames: int = Field(30, ge=2, le=100_000)  # length of a recording; longer logs are cut (reading 18)
     # Grid class, or none, by Cityscapes label name; replaces single entries of the default (reading 21).

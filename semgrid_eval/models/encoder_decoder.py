@@ -96,9 +96,10 @@ class _Block(nn.Sequential):
 
     def __init__(self, inputs: int, outputs: int, *, activation: Activation, constants: Constants) -> None:
         layers: list[nn.Module] = []
+        eps, momentum = (1e-3, 0.01) if constants == "keras" else (1e-5, 0.1)
         for width in (inputs, outputs):
             # A bias would be removed by the normalisation that follows.
-            layers += [nn.Conv2d(width, outputs, 3, padding=1, bias=False), _normalisation(outputs, constants)]
+            layers += [nn.Conv2d(width, outputs, 3, padding=1, bias=False), nn.BatchNorm2d(outputs, eps, momentum)]
             layers += [nn.ReLU(inplace=True)] if activation == "relu" else []
         super().__init__(*layers)
 
@@ -113,10 +114,6 @@ class _Upsample(nn.Module):
     def forward(self, features: Tensor) -> Tensor:
         larger = F.interpolate(features, scale_factor=2, mode="nearest")
         return torch.as_tensor(self.convolution(F.pad(larger, (0, 1, 0, 1))))
-
-
-def _normalisation(channels: int, constants: Constants) -> nn.BatchNorm2d:
-    return nn.BatchNorm2d(channels, eps=1e-3, momentum=0.01) if constants == "keras" else nn.BatchNorm2d(channels)
 
 
 def _initialise_as_keras(module: nn.Module) -> None:

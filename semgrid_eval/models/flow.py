@@ -38,10 +38,8 @@ class FlowSettings(Config):
     # two inputs, and moving them gained nothing on simulated towns.
     small_speed_limit_mps: float = Field(0.0, ge=0, le=100)
     least_cells: int = Field(3, ge=1)  # smaller components are taken for noise
-    # Shorter motion is taken for the rounding of grids and of the ego motion.
-    least_motion_cells: float = Field(2.0, gt=0)
-    # The smaller of two matched components has at least this share of the other's cells.
-    size_ratio: float = Field(0.5, ge=0, le=1)
+    least_motion_cells: float = Field(2.0, gt=0)  # shorter motion is taken for rounding, of grids and of ego motion
+    size_ratio: float = Field(0.5, ge=0, le=1)  # least share of the larger of two components that the smaller one has
     overlap: float = Field(0.55, ge=0, le=1)  # least intersection over union of the two shapes, one laid over the other
     # At least this share of the place that was left, and of the place that was taken, is known at the other time: what
     # comes out from behind something else has not moved.

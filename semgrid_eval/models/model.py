@@ -17,8 +17,8 @@ class Given:
 
     sensors: tuple[str, ...]  # names of the inputs' sensors, in the order of S
     inputs: int  # grids of each sensor, T
-    rows: int  # of a grid, H, and `columns` W
-    columns: int
+    rows: int  # of a grid, H
+    columns: int  # W
     cell_m: float  # edge of a cell
     translate: bool  # whether inputs are moved into the target's place
 
@@ -36,11 +36,8 @@ class Given:
 class Model:
     """Base of all models: subclass it, answer in `predict`, and in `fit` learn from training windows.
 
-    What gradients train is a `models.network.Network`.
-
-    Args:
-        settings: of the class `Settings`, complete.
-        given: what the row gives it.
+    What gradients train is a `models.network.Network`. A model is made with complete settings, of its class `Settings`,
+    and with what the row gives it.
     """
 
     Settings: ClassVar[type[Config]] = Config

@@ -40,8 +40,9 @@ class ScheduleConfig(Config):
     """The learning rate, epoch by epoch; the defaults are the paper's."""
 
     learning_rate: float = Field(default=1e-3, gt=0)
-    # Epochs after this many use `rate_after_drop`; None keeps `learning_rate`.
-    drop_epoch: int | None = Field(default=35, ge=0)
+    drop_epoch: int | None = Field(
+        default=35, ge=0
+    )  # epochs after it use `rate_after_drop`; None keeps `learning_rate`
     rate_after_drop: float = Field(default=1e-4, gt=0)
 
     def rate_in(self, epoch: int) -> float:
@@ -54,8 +55,7 @@ class TrainingConfig(Config):
     """How a network is trained; the defaults are the paper's (readings 1 and 7)."""
 
     epochs: int = Field(default=40, ge=1)
-    # Batches an epoch; with `epoch_unit: windows` it counts windows instead.
-    updates_per_epoch: int = Field(default=185, ge=1)
+    updates_per_epoch: int = Field(default=185, ge=1)  # batches, or windows with `epoch_unit: windows`
     epoch_unit: Literal["batches", "windows"] = "batches"
     batch: int = Field(default=32, ge=1)
     precision: Precision = "auto"  # `auto` takes bfloat16 where the device multiplies in it natively

@@ -12,7 +12,6 @@ from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
 from semgrid_eval.models.device import choose_precision
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.network import NetworkSettings
-from semgrid_eval.models.registry import find_model, version_of
 from semgrid_eval.runs.data import grid_digest
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
@@ -59,17 +58,6 @@ class Job:
     windows_id: str
     training: Training | None  # what is learned from, if anything
     left_out: dict[str, str]  # logs whose recordings are too short for the row's windows, and by how much
-
-
-def resolve(row: Row) -> Resolved:
-    """Find a row's model.
-
-    Raises:
-        InputError: it cannot be loaded, or a file that it declares is missing.
-        ConfigError: it does not take the row's settings.
-    """
-    model = find_model(row.model)
-    return Resolved(model, row.settings_of(model), version_of(row.model))
 
 
 def id_of_training(

@@ -40,8 +40,7 @@ class _MatrixFile(Config):
     without: list[str] = Field(default_factory=list)  # written names of the base's rows to leave out
     title: str = Field("", max_length=200)  # the name of the file if not given, also where it extends another
     seed: int | None = Field(None, ge=0)
-    # Settings of models by name, under those of every row of that model.
-    models: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    models: dict[str, dict[str, Any]] = Field(default_factory=dict)  # settings by model, under those of its rows
     defaults: dict[str, Any] = Field(default_factory=dict)
     rows: list[dict[str, Any]] = Field(default_factory=list)
 

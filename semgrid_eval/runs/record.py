@@ -19,17 +19,7 @@ from semgrid_eval.runs.row import Row, units_of
 from semgrid_eval.runs.worker import Worker
 from semgrid_eval.scores import results
 
-_NEEDED = [
-    "torch",
-    "numpy",
-    "numba",
-    "opencv-python-headless",
-    "mcap",
-    "protobuf",
-    "pandas",
-    "eclipse-sumo",
-    "embreex",
-]
+_NEEDED = ["torch", "numpy", "numba", "opencv-python-headless", "mcap", "protobuf", "pandas", "eclipse-sumo", "embreex"]
 
 
 class Outcome(NamedTuple):

@@ -10,8 +10,7 @@ from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.model import Given, Model
-from semgrid_eval.models.own import installed_models
-from semgrid_eval.models.registry import MODELS, find_model, is_named
+from semgrid_eval.models.registry import MODELS, find_model, installed_models, is_named
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.results import RowFacts
 from semgrid_eval.windows.plan import WindowConfig
@@ -34,11 +33,9 @@ class Row(Config):
 
     name: str = Field(min_length=1, max_length=200)  # unique in the matrix, like `ED-Sp2`; axes fill in `{key}` places
     model: str  # name of a built-in or installed model, or `path.py:Class` of one's own
-    # Of the model, complete unless its code cannot be loaded.
-    settings: dict[str, Any] = Field(default_factory=dict, validate_default=True)
+    settings: dict[str, Any] = Field(default_factory=dict, validate_default=True)  # complete if its code can be loaded
     grid: GridConfig = GridConfig()
-    # Inputs, from the grid config's sensors; those of its target if not given.
-    sensors: tuple[str, ...] = Field(default_factory=_target_sensors, min_length=1)
+    sensors: tuple[str, ...] = Field(default_factory=_target_sensors, min_length=1)  # inputs; the target's if not given
     translate: bool = True  # whether inputs are moved to the target's time (T2); the paper's NT rows do not
     mask_mode: MaskMode = "exclude"  # what becomes of the mask M in scores (reading 9)
     repeats: int = Field(1, ge=1, le=1000)  # seeds of a model in which chance plays a part

@@ -29,17 +29,17 @@ from semgrid_eval.windows.data import WindowSet
 class RunOptions:
     """How a matrix is run; but for the logs to score, nothing here changes its numbers on one machine."""
 
-    device: str  # `auto`, `cpu`, `cuda`, `cuda:1`, ..
+    device: str  # `auto`, `cpu`, `cuda`, `cuda:1`, ...
     grids: Path  # folder in which grids are kept
     command: str  # how the run was started, for the record
-    # Names or patterns of the rows to work on, all where it is empty; what others have is kept on record.
-    only: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()  # names or patterns of rows, all where it is empty; what others have is kept on record
     executor: Executor = field(default_factory=InProcess)  # where rows are trained and scored
     grid_executor: Executor = field(default_factory=InProcess)  # where grids are built and pictures made small
     pictures: bool = True  # whether to keep small pictures of the windows' frames for the report
     validation_logs: Path | None = None  # folder of the logs to score, where they are not among those to train on
-    # Folder of the trainings, the run's own if not given; what another run has trained is found there.
-    trainings: Path | None = None
+    trainings: Path | None = (
+        None  # their folder, the run's own if not given; what another run has trained is found there
+    )
 
 
 def run_matrix(
@@ -108,11 +108,7 @@ def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[Windo
 
 
 def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:
-    """Make a worker of this process for the units of a matrix; it builds or reads grids when they are asked for.
-
-    Raises:
-        InputError: there is no log at all, or the device does not exist.
-    """
+    """Make a worker of this process for the units of a matrix; it builds or reads grids when they are asked for."""
     settle_process()
     device = choose_device(options.device)
     # Where others do the work, the grids here need no room on the device.

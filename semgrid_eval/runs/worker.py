@@ -14,6 +14,7 @@ from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
 from semgrid_eval.models.device import seeded
 from semgrid_eval.models.model import Model, parameter_count
 from semgrid_eval.models.network import Network, seeded_network
+from semgrid_eval.models.registry import find_model, version_of
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.data import RunData, grid_digest
@@ -24,7 +25,6 @@ from semgrid_eval.runs.job import (
     Training,
     id_of_training,
     id_of_windows,
-    resolve,
     target_key,
     window_records,
 )
@@ -44,10 +44,10 @@ class Worker:
     Its methods raise a `SemgridError` where a row cannot be run; the message says why.
     """
 
-    out: Path  # folder of the run, and `trainings` that of the trainings
-    trainings: Path
-    training_data: RunData  # the grids to train on, and `scored_data` those to score on, mostly the same
-    scored_data: RunData
+    out: Path  # folder of the run
+    trainings: Path  # folder of the trainings
+    training_data: RunData  # the grids to train on
+    scored_data: RunData  # the grids to score on, mostly the same
     device: torch.device  # where models run
     threads: int  # of numeric libraries where the units are worked on, which may be another process
     example_seed: int  # of the results whose predictions are kept for a report's examples
@@ -63,7 +63,8 @@ class Worker:
 
     def look(self, row: Row, seed: int | None) -> Job:
         """Resolve a row with one seed into its model, its windows, its training and the id of its result."""
-        resolved = resolve(row)
+        model = find_model(row.model)
+        resolved = Resolved(model, row.settings_of(model), version_of(row.model))
         scored, left_out = self.scored_windows(row)
         windows_id = id_of_windows(row, scored)
         training = self._training(resolved, row, seed, scored) if resolved.model.learns() else None

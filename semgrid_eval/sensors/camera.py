@@ -15,7 +15,6 @@ from semgrid_eval.sensors.sensor import Points, SensorConfig
 
 if TYPE_CHECKING:
     from semgrid_eval.log.reader import LogReader
-    from semgrid_eval.recording.types import CameraFrame
 
 _SIZE_PX = (16, 8192)
 
@@ -25,12 +24,11 @@ class CameraSensor(SensorConfig):
 
     kind: Literal["camera"] = "camera"
     camera: str | None = None  # its name in the log; None takes a log's only one
-    # Width and height to which labels and disparity are brought before projection (reading 22).
-    image_size_px: tuple[int, int] = (512, 256)
-    top_px: int = Field(0, ge=0)  # first row, and `left_px` first column
-    bottom_px: int | None = None  # end of the rows, and `right_px` of the columns; None reaches to the edge
+    image_size_px: tuple[int, int] = (512, 256)  # to which labels and disparity are brought first (reading 22)
+    top_px: int = Field(0, ge=0)
+    bottom_px: int | None = None  # None reaches to the edge
     left_px: int = Field(0, ge=0)
-    right_px: int | None = None
+    right_px: int | None = None  # None reaches to the edge
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -100,18 +98,12 @@ def _read_camera(
     sizes_px = dict.fromkeys(sensor.image_size_px for sensor in sensors.values())
     projections = {size_px: Projection(log.calibration(camera), size_px, class_by_label) for size_px in sizes_px}
     for frame in log.frames(camera):
-        disparity, label = decode_gray(frame.disparity_png, bit_depth=16), decode_gray(_label_png(frame), bit_depth=8)
+        if not frame.label_png:
+            place = f"frame at {frame.stamp_ns} ns"
+            raise LogError("has no label image; add labels to the log (convert cityscapes --labels DIR)", field=place)
+        disparity, label = decode_gray(frame.disparity_png, bit_depth=16), decode_gray(frame.label_png, bit_depth=8)
         seen = {size_px: projection.points(disparity, label) for size_px, projection in projections.items()}
         for name, sensor in sensors.items():
             top, bottom, left, right = sensor.crop_px
             pixels, part = seen[sensor.image_size_px], np.s_[top:bottom, left:right]
             yield Points(name, frame.stamp_ns, pixels.forward_m[part], pixels.left_m[part], pixels.class_id[part])
-
-
-def _label_png(frame: "CameraFrame") -> bytes:
-    if not frame.label_png:
-        raise LogError(
-            "has no label image; add labels to the log (convert cityscapes --labels DIR)",
-            field=f"frame at {frame.stamp_ns} ns",
-        )
-    return frame.label_png

@@ -18,8 +18,7 @@ class SensorConfig(Config):
     """Settings that sensors of all kinds have."""
 
     kind: str  # one of `semgrid_eval.sensors.kinds.KINDS`
-    # How old an observation may be at the time of a grid; an older one is left out.
-    max_age_s: float = Field(0.2, ge=0.0, le=10.0)
+    max_age_s: float = Field(0.2, ge=0.0, le=10.0)  # what is older at the time of a grid is left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +30,10 @@ class Points:
 
     sensor: str  # its name in the grid's configuration
     stamp_ns: int  # when the points were seen
-    # Float64, and `left_m`, in the vehicle frame of that time (ISO 8855, origin on the ground under the rear axle).
+    # float64, and `left_m`, in the vehicle frame of that time (ISO 8855, origin on the ground under the rear axle).
     forward_m: NDArray[np.float64]
     left_m: NDArray[np.float64]
-    # Uint8 grid class; where it is `NO_POINT` there is nothing, whatever the coordinates say.
-    class_id: NDArray[np.uint8]
+    class_id: NDArray[np.uint8]  # where it is `NO_POINT` there is nothing, whatever the coordinates say
 
 
 ReadPoints = Callable[["LogReader", Mapping[str, Any], NDArray[np.uint8]], Iterator[Points]]

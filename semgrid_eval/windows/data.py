@@ -19,8 +19,7 @@ from semgrid_eval.windows.plan import Window
 class WindowBatch:
     """What a predictor sees of B windows, and what it is scored on."""
 
-    # (B, S, T, H, W) uint8 class ids, oldest first; in the target's place if the row translates, else as seen.
-    past: Tensor
+    past: Tensor  # (B, S, T, H, W) uint8 class ids, oldest first; in the target's place where the row translates
     sensors: tuple[str, ...]  # names along S
     shift_cells: Tensor  # (B, T, 2) int64 rows and columns by which ego motion moves each input into the target's place
     lead_s: Tensor  # (B, T) float32 time from each input to the target
@@ -36,10 +35,10 @@ class WindowSet:
     sensors: tuple[str, ...]
     sensor_rows: Tensor  # (S,) int64 where the input sensors lie in the data
     translate: bool  # whether inputs are moved into the target's place
-    inputs: Tensor  # (N, T) int64; target_frames: (N,) int64; shift_cells: (N, T, 2) int64; lead_s: (N, T) float32
-    target_frames: Tensor
-    shift_cells: Tensor
-    lead_s: Tensor
+    inputs: Tensor  # (N, T) int64
+    target_frames: Tensor  # (N,) int64
+    shift_cells: Tensor  # (N, T, 2) int64
+    lead_s: Tensor  # (N, T) float32
 
     def __len__(self) -> int:
         return len(self.target_frames)

@@ -30,13 +30,12 @@ class GridData:
     grids: Tensor  # (S, F, H, W) uint8 class ids
     sensors: tuple[str, ...]  # names along S
     target: str  # which of them the targets come from
-    recordings: tuple[str, ...]  # names of the recordings, and `logs` the paths of their logs
-    logs: tuple[str, ...]
+    recordings: tuple[str, ...]  # names of the recordings
+    logs: tuple[str, ...]  # paths of their logs
     digests: tuple[str, ...]  # of those logs
     first_frames: NDArray[np.int64]  # (R + 1,) where each recording begins along F, and F
     stamps_ns: NDArray[np.int64]  # (F,) int64
-    # (F, 2) float64, forward and left in the grid orientation of the frame's own recording.
-    position_m: NDArray[np.float64]
+    position_m: NDArray[np.float64]  # (F, 2) forward and left in the grid orientation of the frame's own recording
     cell_m: float  # edge of a cell
     # For each recording (its F, H, W) flags of true actors, None where its log does not hold the truth. They stay on
     # the host: scores are split by them, and nothing is predicted from them.

@@ -16,8 +16,7 @@ class WindowConfig(Config):
     inputs: int = Field(default=2, ge=1)
     step_frames: int = Field(default=5, ge=1)
     horizon_steps: int = Field(default=1, ge=1)
-    # Index of the one target of each validation recording; None takes every possible target.
-    target_frame: int | None = Field(default=25, ge=0)
+    target_frame: int | None = Field(default=25, ge=0)  # the one target of a validation recording; None takes every one
 
     @property
     def reach_frames(self) -> int:
@@ -27,13 +26,11 @@ class WindowConfig(Config):
     @model_validator(mode="after")
     def _inputs_lie_in_recording(self) -> Self:
         if self.target_frame is not None and self.target_frame < self.reach_frames:
+            shape = f"inputs {self.inputs}, step_frames {self.step_frames} and horizon_steps {self.horizon_steps}"
             raise ValueError(
-                f"target_frame {self.target_frame} is too early: {self._shape()} reach back {self.reach_frames} frames"
+                f"target_frame {self.target_frame} is too early: {shape} reach back {self.reach_frames} frames"
             )
         return self
-
-    def _shape(self) -> str:
-        return f"inputs {self.inputs}, step_frames {self.step_frames} and horizon_steps {self.horizon_steps}"
 
 
 @dataclass(frozen=True)
@@ -89,14 +86,10 @@ def _plan(
         raise InputError(
             f"a window needs {needed} frames, and the longest of {len(too_short)} recordings has {longest}"
         )
+    reach, step = config.reach_frames, config.step_frames
     windows = (
-        Window(recording, _input_frames(target, config), target)
+        Window(recording, tuple(range(target - reach, target, step)[: config.inputs]), target)
         for recording, frames in enumerate(targets)
         for target in frames
     )
     return WindowPlan(tuple(windows), too_short)
-
-
-def _input_frames(target: int, config: WindowConfig) -> tuple[int, ...]:
-    first = target - config.reach_frames
-    return tuple(first + i * config.step_frames for i in range(config.inputs))

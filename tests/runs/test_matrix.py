@@ -7,7 +7,7 @@ import yaml
 
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
-from semgrid_eval.models.own import ENTRY_POINT_GROUP
+from semgrid_eval.models.registry import ENTRY_POINT_GROUP
 from semgrid_eval.runs.matrix import load_matrix, preset_names
 
 SCALED = ("paper-cpu", "architecture-cpu", "sensitivity")
