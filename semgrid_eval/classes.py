@@ -10,8 +10,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-NO_POINT = 255
-"""Value of the class map for labels that give no point at all: sky, the ego vehicle, void."""
+NO_POINT = 255  # value of the class map for labels that give no point at all: sky, the ego vehicle, void
 
 
 class Category(IntEnum):

@@ -14,8 +14,7 @@ from semgrid_eval.sensors.kinds import Sensor, SensorName
 from semgrid_eval.sensors.sensor import SensorConfig
 
 Morphology = Literal["minkowski", "opencv", "off"]
-STANDING, MOVING = 1, 2
-"""Bits of the flags that say whose footprint a cell lies in."""
+STANDING, MOVING = 1, 2  # bits of the flags that say whose footprint a cell lies in
 
 
 class GridSpec(Config):

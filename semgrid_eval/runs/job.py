@@ -17,8 +17,7 @@ from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
 
-SCORING_VERSION = 3
-"""Counts changes to how windows are kept and scored; results of another version are made again."""
+SCORING_VERSION = 3  # counts changes to how windows are kept and scored; results of another version are made again
 
 
 @dataclass(frozen=True)

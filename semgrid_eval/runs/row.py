@@ -13,7 +13,7 @@ from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.registry import MODELS, find_model, installed_models, is_named
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.results import RowFacts
-from semgrid_eval.windows.plan import WindowConfig
+from semgrid_eval.windows.data import WindowConfig
 
 
 def _target_sensors(known: dict[str, Any]) -> tuple[str, ...]:
@@ -67,7 +67,7 @@ class Row(Config):
         if self.scored_window.inputs != self.window.inputs:
             raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
         if found := self.found_model():
-            found.check(self.settings_of(found), self.given)
+            found.check(found.parse_settings(self.settings), self.given)
         return self
 
     @property
@@ -84,14 +84,6 @@ class Row(Config):
     def found_model(self) -> type[Model] | None:
         """Return the class of the row's model, None where its code cannot be loaded."""
         return _found(self.model)
-
-    def settings_of(self, model: type[Model]) -> Config:
-        """Return the settings as the model takes them.
-
-        Raises:
-            ConfigError: they are not this model's.
-        """
-        return model.parse_settings(self.settings)
 
     def identity(self) -> dict[str, object]:
         """Return what determines the row's numbers, besides code and logs: all but its name and repeats."""
@@ -119,7 +111,7 @@ class Row(Config):
         found = self.found_model()
         horizon = self.scored_window.horizon_steps
         parts = [
-            found.in_words(self.settings_of(found)) if found else self.model,
+            found.in_words(found.parse_settings(self.settings)) if found else self.model,
             "moved to the target's time" if self.translate else "not moved",
             f"{self.window.inputs} inputs",
             f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead",

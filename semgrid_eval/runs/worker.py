@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import torch
@@ -31,8 +32,15 @@ from semgrid_eval.runs.job import (
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
-from semgrid_eval.windows.data import WindowSet, select_windows, window_arrays
-from semgrid_eval.windows.plan import WindowConfig, WindowPlan, training_windows, validation_windows
+from semgrid_eval.windows.data import (
+    WindowConfig,
+    WindowPlan,
+    WindowSet,
+    select_windows,
+    training_windows,
+    validation_windows,
+    window_arrays,
+)
 
 WindowPlanner = Callable[[Sequence[int], WindowConfig], WindowPlan]
 
@@ -64,7 +72,7 @@ class Worker:
     def look(self, row: Row, seed: int | None) -> Job:
         """Resolve a row with one seed into its model, its windows, its training and the id of its result."""
         model = find_model(row.model)
-        resolved = Resolved(model, row.settings_of(model), version_of(row.model))
+        resolved = Resolved(model, model.parse_settings(row.settings), version_of(row.model))
         scored, left_out = self.scored_windows(row)
         windows_id = id_of_windows(row, scored)
         training = self._training(resolved, row, seed, scored) if resolved.model.learns() else None
@@ -141,30 +149,20 @@ class Worker:
 
     def _fitted(self, job: Job) -> tuple[Model, float | None]:
         """Return the job's model, ready to predict, and how many seconds gradients have trained it."""
-        made, settings = job.resolved.model, job.resolved.settings
-        if job.training and issubclass(made, Network):
-            return self._trained(seeded_network(made, settings, job.row.given, job.seed or 0), job.training, job)
+        made, settings, training, seed = job.resolved.model, job.resolved.settings, job.training, job.seed or 0
+        if training and issubclass(made, Network):
+            network = seeded_network(made, settings, job.row.given, seed)
+            train_it = partial(train, network, training.windows, seed=seed, device=self.device, folder=training.folder)
+            with self.stage(f"train {job.row.name} (seed {seed})") as progress:
+                trained = train_it(progress=progress, validation=training.watched)
+            return trained.network, round(trained.seconds, 3)
         model = made(settings, job.row.given)
         if isinstance(model, torch.nn.Module):
             model.to(self.device).eval()
-        if job.training:
+        if training:
             with self.stage(f"fit {job.row.name}"):
-                model.fit(job.training.windows)
+                model.fit(training.windows)
         return model, None
-
-    def _trained(self, network: Network, training: Training, job: Job) -> tuple[Network, float]:
-        seed = job.seed or 0
-        with self.stage(f"train {job.row.name} (seed {seed})") as progress:
-            trained = train(
-                network,
-                training.windows,
-                seed=seed,
-                device=self.device,
-                folder=training.folder,
-                progress=progress,
-                validation=training.watched,
-            )
-        return trained.network, round(trained.seconds, 3)
 
     def _result_record(
         self, job: Job, model: Model, train_seconds: float | None, predict_seconds: float
