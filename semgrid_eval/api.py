@@ -235,12 +235,9 @@ def run(
 def load_run(
     run: Path | str, *, metrics: Sequence[str] | None = None, partitions: Sequence[str] | None = None
 ) -> "DataFrame":
-    """Return every figure of a run: row, seed, metric, division, region, column, value, cells, windows.
+    """Return every figure of a run's folder: row, seed, metric, division, region, column, value, cells, windows.
 
-    Args:
-        run: its folder.
-        metrics: names of metrics, all by default.
-        partitions: names of partitions into regions, all by default.
+    It has all metrics and partitions into regions, or those that are named.
 
     Raises:
         InputError: the run or a result of it cannot be read.

@@ -42,11 +42,11 @@ class Model:
 
     Settings: ClassVar[type[Config]] = Config  # strict configuration class of what a row may set under `settings`
     words: ClassVar[str] = ""  # what it does, for labels; the name of the class, where it does not say
-    family: ClassVar[str] = ""
-    """How figures group models, like `BL`; of one's own the name of the class, where it does not say."""
+    family: ClassVar[str] = (
+        ""  # how figures group models, like `BL`; of one's own the class's name, where it does not say
+    )
     baseline: ClassVar[bool] = False  # whether other rows are measured against it
-    random: ClassVar[bool] = False
-    """Whether chance plays a part: rows are then repeated with seeds, and torch's generator is seeded with them."""
+    random: ClassVar[bool] = False  # whether chance plays a part: rows are repeated with seeds of torch's generator
     files: ClassVar[tuple[str, ...] | None] = None
     """Files beside its module that it reads (weights): all of them, so that its results can be kept, or None."""
     version: ClassVar[str] = "1"  # part of all ids: counted up by whoever changes the numbers of a built-in model

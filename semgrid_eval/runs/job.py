@@ -3,15 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import torch
-
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.config import Config
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
-from semgrid_eval.models.device import choose_precision
 from semgrid_eval.models.model import Model
-from semgrid_eval.models.network import NetworkSettings
 from semgrid_eval.runs.data import grid_digest
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
@@ -57,33 +53,6 @@ class Job:
     windows_id: str
     training: Training | None  # what is learned from, if anything
     left_out: dict[str, str]  # logs whose recordings are too short for the row's windows, and by how much
-
-
-def id_of_training(
-    resolved: Resolved,
-    row: Row,
-    seed: int | None,
-    device: torch.device,
-    *,
-    threads: int,
-    windows: WindowSet,
-    watched: WindowSet | None,
-) -> str:
-    """Digest all that decides what a model learns."""
-    settings = resolved.settings
-    trained_in = choose_precision(settings.training.precision, device) if isinstance(settings, NetworkSettings) else ""
-    return digest_value(
-        {
-            "model": [resolved.model.__name__, resolved.version, settings.model_dump(mode="json")],
-            "precision": str(trained_in),
-            "device": device.type,
-            # Sums on a CPU are rounded by how many threads share them.
-            "threads": threads if device.type == "cpu" else None,
-            "seed": seed,
-            "windows": [windows.digest(), watched.digest() if watched else None],
-            "grids": [GRIDS, grid_digest(row.grid), list(CLASS_NAMES)],
-        }
-    )
 
 
 def id_of_windows(row: Row, scored: WindowSet) -> str:

@@ -5,10 +5,11 @@ from collections import defaultdict
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import torch
+
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.checkpoint import HISTORY_FILE, read_history
-from semgrid_eval.models.device import torch_threads
 from semgrid_eval.models.network import Network, NetworkSettings, ScheduleConfig, TrainingConfig, seeded_network
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage, silent_stage
@@ -117,8 +118,13 @@ class _Speed:
     def _measure(self, job: Job, sample: NetworkSettings) -> float:
         assert job.training is not None
         assert issubclass(job.resolved.model, Network)
-        with tempfile.TemporaryDirectory() as folder, torch_threads(self._worker.threads):
-            network = seeded_network(job.resolved.model, sample, job.row.given, seed=0)
-            path = Path(folder) / "sample"
-            trained = train(network, job.training.windows, seed=0, device=self._worker.device, folder=path)
+        network = seeded_network(job.resolved.model, sample, job.row.given, seed=0)
+        threads = torch.get_num_threads()
+        torch.set_num_threads(self._worker.threads)
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                windows, device = job.training.windows, self._worker.device
+                trained = train(network, windows, seed=0, device=device, folder=Path(folder))
+        finally:
+            torch.set_num_threads(threads)
         return min(epoch.seconds for epoch in trained.history) / sample.training.updates_per_epoch

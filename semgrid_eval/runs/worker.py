@@ -9,26 +9,19 @@ from pathlib import Path
 import torch
 
 from semgrid_eval.arrays import write_arrays
+from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import atomic_folder, digest_value
+from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
-from semgrid_eval.models.device import seeded
+from semgrid_eval.models.device import choose_precision, seeded
 from semgrid_eval.models.model import Model, parameter_count
-from semgrid_eval.models.network import Network, seeded_network
+from semgrid_eval.models.network import Network, NetworkSettings, seeded_network
 from semgrid_eval.models.registry import find_model, version_of
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.data import RunData, grid_digest
-from semgrid_eval.runs.job import (
-    SCORING_VERSION,
-    Job,
-    Resolved,
-    Training,
-    id_of_training,
-    id_of_windows,
-    target_key,
-    window_records,
-)
+from semgrid_eval.runs.job import SCORING_VERSION, Job, Resolved, Training, id_of_windows, target_key, window_records
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
@@ -142,8 +135,21 @@ class Worker:
     def _training(self, resolved: Resolved, row: Row, seed: int | None, scored: WindowSet) -> Training:
         windows = self._select(self.training_data, row, row.train_split, row.window, training_windows)[0]
         watched = self._watched(row, scored) if issubclass(resolved.model, Network) else None
-        training_id = id_of_training(
-            resolved, row, seed, self.device, threads=self.threads, windows=windows, watched=watched
+        # All that decides what a model learns.
+        settings, precision = resolved.settings, ""
+        if isinstance(settings, NetworkSettings):
+            precision = str(choose_precision(settings.training.precision, self.device))
+        training_id = digest_value(
+            {
+                "model": [resolved.model.__name__, resolved.version, settings.model_dump(mode="json")],
+                "precision": precision,
+                "device": self.device.type,
+                # Sums on a CPU are rounded by how many threads share them.
+                "threads": self.threads if self.device.type == "cpu" else None,
+                "seed": seed,
+                "windows": [windows.digest(), watched.digest() if watched else None],
+                "grids": [GRIDS, grid_digest(row.grid), list(CLASS_NAMES)],
+            }
         )
         return Training(training_id, self.trainings / training_id, windows, watched)
 

@@ -65,11 +65,7 @@ class CameraSensor(SensorConfig):
 def read_cameras(
     log: "LogReader", sensors: Mapping[str, CameraSensor], class_by_label: NDArray[np.uint8]
 ) -> Iterator[Points]:
-    """Iterate over what parts of cameras' images see, each image decoded once.
-
-    Raises:
-        LogError: there is no such camera, what is read is damaged, or a frame has no labels.
-    """
+    """Iterate over what parts of cameras' images see, each image decoded once, as `Kind` says."""
     by_camera: dict[str, dict[str, CameraSensor]] = {}
     for name, sensor in sensors.items():
         by_camera.setdefault(log.choose_camera(sensor.camera), {})[name] = sensor

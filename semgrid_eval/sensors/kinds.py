@@ -3,7 +3,6 @@
 import heapq
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -55,26 +54,20 @@ def read_points(
     return heapq.merge(*streams, key=lambda points: points.stamp_ns)
 
 
-@dataclass(frozen=True)
-class Snapshot:
-    """What all sensors have seen last at a time; a sensor without a recent observation is left out."""
-
-    stamp_ns: int
-    points: Mapping[str, Points]
-
-
-def synchronise(observations: Iterable[Points], sensors: Mapping[str, SensorConfig], leader: str) -> Iterator[Snapshot]:
+def synchronise(
+    observations: Iterable[Points], sensors: Mapping[str, SensorConfig], leader: str
+) -> Iterator[tuple[int, dict[str, Points]]]:
     """Iterate over the times of the leading sensor with the newest observation that each sensor had made by then.
 
-    Observations are of all sensors, in the order of time; `sensors` say how old one may be.
+    Observations are of all sensors, in the order of time; `sensors` say how old one may be: who has none is left out.
     """
     newest: dict[str, Points] = {}
     now: Points | None = None
 
-    def snapshot(now: Points) -> Snapshot:
+    def snapshot(now: Points) -> tuple[int, dict[str, Points]]:
         ages_ns = {name: now.stamp_ns - points.stamp_ns for name, points in newest.items()}
         recent = [name for name, age_ns in ages_ns.items() if age_ns <= sensors[name].max_age_s * 1e9]
-        return Snapshot(now.stamp_ns, {name: newest[name] for name in recent})
+        return now.stamp_ns, {name: newest[name] for name in recent}
 
     for points in observations:
         if now is not None and (points.sensor == leader or points.stamp_ns > now.stamp_ns + TOLERANCE_NS):

@@ -15,12 +15,9 @@ from semgrid_eval.errors import InputError
 if TYPE_CHECKING:  # building grids needs the log readers; using built ones does not
     from semgrid_eval.grids.recording import GridRecording
 
+# How long an actor's footprints stay near a target. That holds all ghosts that rows of the paper can leave: five
+# inputs, or a horizon three steps longer, reach back 25 frames, 1.47 s.
 GHOST_S = 1.5
-"""How long an actor's footprints stay near a target.
-
-That holds all ghosts that rows of the paper can leave: five inputs, or a horizon three steps longer, reach back 25
-frames, 1.47 s.
-"""
 
 
 @dataclass(frozen=True)
