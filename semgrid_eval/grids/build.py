@@ -164,7 +164,6 @@ class _Stretch:
 
 
 def _build_and_keep(log: Path, folder: Path, config: GridConfig) -> str | None:
-    """Make the grids of a log, or return why not."""
     try:
         write_recordings(_cache_file(log, folder, config), build_log(log, config))
     except SemgridError as error:

@@ -113,11 +113,7 @@ def save_weights(network: Network, path: Path, **notes: str) -> None:
 
 
 def load_weights(network: Network, path: Path) -> None:
-    """Load weights that `save_weights` wrote into a network of the same build.
-
-    Raises:
-        InputError: the file is missing, damaged or of another network.
-    """
+    """Load weights that `save_weights` wrote into a network of the same build; an `InputError` says what is wrong."""
     read_header(path)
     try:
         with safe_open(path, framework="pt") as archive:

@@ -91,7 +91,6 @@ def _load(name: str, *above: Path) -> tuple[Path, object]:
 
 
 def _extended(base: _MatrixFile, file: _MatrixFile, path: Path) -> _MatrixFile:
-    """Put a file over the one that it extends."""
     names = [_written_name(row) for row in base.rows]
     for name in file.without:
         if name not in names:

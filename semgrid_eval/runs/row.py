@@ -16,11 +16,6 @@ from semgrid_eval.scores.results import RowFacts
 from semgrid_eval.windows.data import WindowConfig
 
 
-def _target_sensors(known: dict[str, Any]) -> tuple[str, ...]:
-    """Return the sensors of the target of a row's grid, none where that is at fault itself."""
-    return known["grid"].target if "grid" in known else ()
-
-
 def _found(model: str) -> type[Model] | None:
     try:
         return find_model(model)
@@ -35,7 +30,10 @@ class Row(Config):
     model: str  # name of a built-in or installed model, or `path.py:Class` of one's own
     settings: dict[str, Any] = Field(default_factory=dict, validate_default=True)  # complete if its code can be loaded
     grid: GridConfig = GridConfig()
-    sensors: tuple[str, ...] = Field(default_factory=_target_sensors, min_length=1)  # inputs; the target's if not given
+    # Of the inputs; those of the target if not given. A grid that is at fault itself is not among what is known.
+    sensors: tuple[str, ...] = Field(
+        default_factory=lambda known: known["grid"].target if "grid" in known else (), min_length=1
+    )
     translate: bool = True  # whether inputs are moved to the target's time (T2); the paper's NT rows do not
     mask_mode: MaskMode = "exclude"  # what becomes of the mask M in scores (reading 9)
     repeats: int = Field(1, ge=1, le=1000)  # seeds of a model in which chance plays a part

@@ -22,7 +22,6 @@ TOLERANCE_NS = 1_000_000
 
 
 def _of_its_kind(value: object) -> object:
-    """Turn a mapping into the settings of its kind."""
     if not isinstance(value, Mapping):
         return value
     kind = value.get("kind", _DEFAULT_KIND)
