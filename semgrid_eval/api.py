@@ -24,17 +24,15 @@ from semgrid_eval.models.network import Network, seeded_network
 from semgrid_eval.models.registry import find_model
 from semgrid_eval.models.training import train
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.runner import run_matrix
-from semgrid_eval.runs.units import RunOptions
+from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores.metrics.iou import confusion
 from semgrid_eval.scores.metrics.metric import column_names
 from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.scores.results import RunRecord
 from semgrid_eval.scores.tidy import load_figures
 from semgrid_eval.sources.known import SOURCES, load_source
-from semgrid_eval.windows.data import WindowSet, select_windows
+from semgrid_eval.windows.data import WindowConfig, WindowSet, select_windows, training_windows
 from semgrid_eval.windows.grids import stack_recordings
-from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -165,7 +163,7 @@ def make_model(
     made = find_model(model) if isinstance(model, str) else model
     rows, columns = windows.data.grids.shape[-2:]
     given = Given(windows.sensors, windows.inputs.shape[1], rows, columns, windows.data.cell_m, windows.translate)
-    chosen = parse_config(made.Settings, dict(settings or {}), path="settings")
+    chosen = made.parse_settings(dict(settings or {}), path="settings")
     made.check(chosen, given)
     return seeded_network(made, chosen, given, seed) if issubclass(made, Network) else made(chosen, given)
 
@@ -237,12 +235,9 @@ def run(
 def load_run(
     run: Path | str, *, metrics: Sequence[str] | None = None, partitions: Sequence[str] | None = None
 ) -> "DataFrame":
-    """Return every figure of a run: row, seed, metric, division, region, column, value, cells, windows.
+    """Return every figure of a run's folder: row, seed, metric, division, region, column, value, cells, windows.
 
-    Args:
-        run: its folder.
-        metrics: names of metrics, all by default.
-        partitions: names of partitions into regions, all by default.
+    It has all metrics and partitions into regions, or those that are named.
 
     Raises:
         InputError: the run or a result of it cannot be read.

@@ -10,8 +10,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-NO_POINT = 255
-"""Value of the class map for labels that give no point at all: sky, the ego vehicle, void."""
+NO_POINT = 255  # value of the class map for labels that give no point at all: sky, the ego vehicle, void
 
 
 class Category(IntEnum):
@@ -25,17 +24,12 @@ class Category(IntEnum):
 
 @dataclass(frozen=True)
 class GridClass:
-    """One class of the grid: its id is its index in `CLASSES`.
-
-    Args:
-        colour: the paper's, sRGB.
-        safe_colour: far from the others for readers with any kind of colour blindness; the paper's reds and greens
-            are not.
-    """
+    """One class of the grid: its id is its index in `CLASSES`."""
 
     name: str
     category: Category
-    colour: tuple[int, int, int]
+    colour: tuple[int, int, int]  # the paper's, sRGB
+    # Far from the others for readers with any kind of colour blindness; the paper's reds and greens are not.
     safe_colour: tuple[int, int, int]
 
 

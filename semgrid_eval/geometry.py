@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Quaternion = tuple[float, float, float, float]
-"""A rotation as (x, y, z, w)."""
+Quaternion = tuple[float, float, float, float]  # A rotation as (x, y, z, w)
 
 
 @dataclass(frozen=True)

@@ -87,8 +87,7 @@ def test_ray_gives_the_same_bytes_as_this_process(tmp_path):
     from semgrid_eval.log.store import write_log
     from semgrid_eval.ray_executor import RayExecutor
     from semgrid_eval.runs.matrix import load_matrix
-    from semgrid_eval.runs.runner import run_matrix
-    from semgrid_eval.runs.units import RunOptions
+    from semgrid_eval.runs.runner import RunOptions, run_matrix
     from semgrid_eval.scores import results
 
     for i, split in enumerate(("train", "val")):

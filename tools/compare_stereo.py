@@ -29,7 +29,7 @@ from semgrid_eval.log.store import LogReader, find_logs
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.recording.types import CameraFrame
 from semgrid_eval.sensors.camera import CameraSensor
-from semgrid_eval.windows.shift import shift_grids, shift_in_cells
+from semgrid_eval.windows.grids import shift_grids, shift_in_cells
 
 RANGES_M = ((0, 10), (10, 20), (20, 30), (30, 40), (40, 60))
 STEP_S = 0.3

@@ -38,24 +38,13 @@ _MEGABYTE = 1e6
 
 
 class Material:
-    """Inputs of the measurements.
-
-    Args:
-        folder: for towns and logs.
-        settings: how large everything is.
-    """
+    """Inputs of the measurements; towns and logs lie in `folder`."""
 
     def __init__(self, folder: Path, settings: Settings) -> None:
-        self.folder = folder
-        self.settings = settings
+        self.folder, self.settings = folder, settings
 
     def plan(self, stereo: Stereo, width_px: int, height_px: int) -> RecordingPlan:
-        """Plan a recording in the town, which is built once; the size is scaled as the settings say.
-
-        Raises:
-            InputError: SUMO failed.
-            MissingExtraError: SUMO or Embree is not installed.
-        """
+        """Plan a recording in the town, which is built once; the size is scaled as the settings say."""
         scale = self.settings.scale
         config = SyntheticConfig(
             recordings=1,

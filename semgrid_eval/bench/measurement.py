@@ -9,29 +9,17 @@ from statistics import median
 
 @dataclass(frozen=True)
 class Settings:
-    """How much is measured.
+    """How much is measured."""
 
-    Args:
-        repeats: of each measurement; their median counts.
-        town_size_m: side of the town that is built.
-        duration_s: simulated time of it.
-        scale: of the images' width and height.
-        features: of the encoder-decoders that are trained.
-        batch: windows of an update.
-        updates: in each repeat.
-        windows: that are predicted and scored in each repeat.
-        matrix_rows: of the square matrices whose product tells the machine's rate.
-    """
-
-    repeats: int = 3
-    town_size_m: float = 450.0
-    duration_s: float = 90.0
-    scale: float = 1.0
-    features: tuple[int, ...] = (16, 32, 64)
-    batch: int = 8
-    updates: int = 4
-    windows: int = 64
-    matrix_rows: int = 2048
+    repeats: int = 3  # of each measurement; their median counts
+    town_size_m: float = 450.0  # side of the town that is built
+    duration_s: float = 90.0  # simulated time of it
+    scale: float = 1.0  # of the images' width and height
+    features: tuple[int, ...] = (16, 32, 64)  # of the encoder-decoders that are trained
+    batch: int = 8  # windows of an update
+    updates: int = 4  # in each repeat
+    windows: int = 64  # that are predicted and scored in each repeat
+    matrix_rows: int = 2048  # of the square matrices whose product tells the machine's rate
 
 
 FULL = Settings()
@@ -40,19 +28,12 @@ QUICK = Settings(repeats=1, features=(16,), updates=3, windows=32)
 
 @dataclass(frozen=True)
 class Measurement:
-    """One measured number.
+    """One measured number."""
 
-    Args:
-        what: was measured, in a few words.
-        value: the median.
-        unit: of the value; `s CPU` is processor time, that of SUMO's tools included.
-        at_most: what is promised, None where nothing is.
-    """
-
-    what: str
-    value: float
-    unit: str
-    at_most: float | None = None
+    what: str  # was measured, in a few words
+    value: float  # the median
+    unit: str  # of the value; `s CPU` is processor time, that of SUMO's tools included
+    at_most: float | None = None  # what is promised, None where nothing is
 
     @property
     def kept(self) -> bool | None:

@@ -25,9 +25,8 @@ from semgrid_eval.models.network import TrainingConfig, masked_loss, seeded_netw
 from semgrid_eval.models.newest import RepeatNewest
 from semgrid_eval.models.training import train
 from semgrid_eval.scores.evaluate import evaluate
-from semgrid_eval.windows.data import WindowSet, select_windows
+from semgrid_eval.windows.data import WindowConfig, WindowSet, select_windows, training_windows
 from semgrid_eval.windows.grids import stack_recordings
-from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 _CELLS, _CELL_M, _FRAMES, _FRAME_NS = 128, 100 / 128, 30, 58_823_529
 _COARSE = 8  # cells of a random patch
@@ -74,15 +73,8 @@ def measure_prediction(settings: Settings, device: torch.device) -> Iterator[Mea
 
 
 def _textbook_rate(config: EncoderDecoderSettings, settings: Settings, device: torch.device) -> float:
-    # The first epoch warms up.
-    seconds = train_by_the_book(
-        config,
-        random_windows(),
-        batch=settings.batch,
-        updates=settings.updates,
-        epochs=settings.repeats + 1,
-        device=device,
-    )
+    size = {"batch": settings.batch, "updates": settings.updates, "epochs": settings.repeats + 1}
+    seconds = train_by_the_book(config, random_windows(), device=device, **size)  # the first epoch warms up
     return settings.updates * settings.batch / median(seconds[1:])
 
 

@@ -31,8 +31,7 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
     from semgrid_eval.log.convert import Work
     from semgrid_eval.report.page.write import write_report
     from semgrid_eval.runs.matrix import load_matrix
-    from semgrid_eval.runs.runner import run_matrix
-    from semgrid_eval.runs.units import RunOptions
+    from semgrid_eval.runs.runner import RunOptions, run_matrix
     from semgrid_eval.sources.town.convert import convert_town
     from semgrid_eval.sources.town.recordings import SyntheticConfig
 

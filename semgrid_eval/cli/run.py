@@ -13,7 +13,7 @@ from semgrid_eval.ray_executor import LOCAL
 
 if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.runs.matrix import Matrix
-    from semgrid_eval.runs.units import RunOptions
+    from semgrid_eval.runs.runner import RunOptions
     from semgrid_eval.scores.results import RunRecord
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -73,8 +73,7 @@ def command(
     """
     from semgrid_eval.models.device import visible_gpus
     from semgrid_eval.runs.matrix import load_matrix
-    from semgrid_eval.runs.runner import run_matrix
-    from semgrid_eval.runs.units import RunOptions, wanted_rows
+    from semgrid_eval.runs.runner import RunOptions, run_matrix, wanted_rows
 
     resolved = load_matrix(matrix, models=models)
     shared = visible_gpus() if device in ("auto", "cuda") else ()

@@ -14,11 +14,9 @@ from semgrid_eval.log.topics import TRUE_ACTORS
 from semgrid_eval.recording.types import Actor, Pose
 
 MOVING_FROM_MPS = 0.5
+# Footprints grow by this much on each side, since the noise of depth smears what a sensor sees of an actor. It is one
+# cell of the paper's grid, and as many metres on every other one.
 MARGIN_M = 100.0 / 128.0
-"""Footprints grow by this much on each side, since the noise of depth smears what a sensor sees of an actor.
-
-It is one cell of the paper's grid, and as many metres on every other one.
-"""
 
 Flags = NDArray[np.uint8]
 Floats = NDArray[np.float64]

@@ -1,6 +1,6 @@
 """Grids of whole recordings: read a log once, make the grids of every sensor, keep them by digest."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, islice
@@ -19,9 +19,8 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.motion import EgoMotion
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.sensors.kinds import read_points
+from semgrid_eval.sensors.kinds import read_points, synchronise
 from semgrid_eval.sensors.sensor import Points
-from semgrid_eval.sensors.synchronise import Snapshot, synchronise
 
 
 @dataclass
@@ -105,7 +104,7 @@ def _stretches(reader: LogReader, config: GridConfig) -> Iterator["_Stretch"]:
     for number, first in enumerate(snapshots):
         stretch = _Stretch(motion, config)
         for snapshot in chain([first], islice(snapshots, config.stretch_frames - 1)):
-            stretch.add(snapshot)
+            stretch.add(*snapshot)
         if number == 0 or len(stretch) == config.stretch_frames:
             yield stretch  # the rest of a log that was cut is too short for the windows of the others
 
@@ -122,14 +121,12 @@ class _Stretch:
     def __len__(self) -> int:
         return len(self._stamps_ns)
 
-    def add(self, snapshot: Snapshot) -> None:
-        """Add the next frame."""
-        self._stamps_ns.append(snapshot.stamp_ns)
-        here = self._first_from_vehicle(snapshot.stamp_ns)
+    def add(self, stamp_ns: int, points: Mapping[str, Points]) -> None:
+        """Add the next frame: what sensors, by name, have seen last."""
+        self._stamps_ns.append(stamp_ns)
+        here = self._first_from_vehicle(stamp_ns)
         self._places.append(here)
-        rows = [
-            [snapshot.points[name] for name in names if name in snapshot.points] for names in self._config.rows.values()
-        ]
+        rows = [[points[name] for name in names if name in points] for names in self._config.rows.values()]
         self._grids.append(np.stack([self._grid(seen, here) for seen in rows]))
 
     def recording(self, reader: LogReader, truth: TrueActors) -> GridRecording:
@@ -167,7 +164,6 @@ class _Stretch:
 
 
 def _build_and_keep(log: Path, folder: Path, config: GridConfig) -> str | None:
-    """Make the grids of a log, or return why not."""
     try:
         write_recordings(_cache_file(log, folder, config), build_log(log, config))
     except SemgridError as error:

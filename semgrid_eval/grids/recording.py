@@ -17,37 +17,23 @@ _ALONG_FRAMES = {"stamps_ns": 0, "grids": 1, "position_m": 0, "yaw_rad": 0}
 
 @dataclass(frozen=True)
 class GridRecording:
-    """The grids of one recording, all in the orientation of its first frame (reading 18).
+    """The grids of one recording, all in the orientation of its first frame (reading 18)."""
 
-    Args:
-        name: of the recording; the stretches of a longer log are told apart by `#1`, `#2`, ...
-        log: path of its log, and `digest` that of its bytes.
-        split: `train`, `val` or `test`.
-        dataset: where it comes from.
-        sensors: names, in the order of `grids`; a target of several sensors is one of them.
-        target: which of them the targets come from.
-        stamps_ns: (F,) times of the first of the target's sensors.
-        grids: (S, F, H, W) uint8 class ids; each grid is centred on the vehicle at its own time.
-        position_m: (F, 2) of the vehicle, forward and left of the first frame.
-        yaw_rad: (F,) heading against the first frame.
-        actors: (F, H, W) uint8, where true actors stand at each frame's time: bits `STANDING` and `MOVING` of the
-            grid's spec; None where the log does not hold the truth.
-        group: the town, city or drive that the log belongs to; empty where it does not say.
-    """
-
-    name: str
-    log: str
-    digest: str
-    split: str
-    dataset: str
-    sensors: tuple[str, ...]
-    target: str
-    stamps_ns: NDArray[np.int64]
-    grids: NDArray[np.uint8]
-    position_m: NDArray[np.float64]
-    yaw_rad: NDArray[np.float64]
+    name: str  # of the recording; the stretches of a longer log are told apart by `#1`, `#2`, ...
+    log: str  # path of its log
+    digest: str  # of the log's bytes
+    split: str  # `train`, `val` or `test`
+    dataset: str  # where it comes from
+    sensors: tuple[str, ...]  # names, in the order of `grids`; a target of several sensors is one of them
+    target: str  # which of them the targets come from
+    stamps_ns: NDArray[np.int64]  # (F,) times of the first of the target's sensors
+    grids: NDArray[np.uint8]  # (S, F, H, W) uint8 class ids; each grid is centred on the vehicle at its own time
+    position_m: NDArray[np.float64]  # (F, 2) of the vehicle, forward and left of the first frame
+    yaw_rad: NDArray[np.float64]  # (F,) heading against the first frame
+    # (F, H, W) uint8, where true actors stand at each frame's time: bits `STANDING` and `MOVING` of the grid's spec;
+    # None where the log does not hold the truth.
     actors: NDArray[np.uint8] | None = None
-    group: str = ""
+    group: str = ""  # the town, city or drive that the log belongs to; empty where it does not say
 
 
 def write_recordings(path: Path, recordings: Sequence[GridRecording]) -> None:

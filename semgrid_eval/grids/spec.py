@@ -14,8 +14,7 @@ from semgrid_eval.sensors.kinds import Sensor, SensorName
 from semgrid_eval.sensors.sensor import SensorConfig
 
 Morphology = Literal["minkowski", "opencv", "off"]
-STANDING, MOVING = 1, 2
-"""Bits of the flags that say whose footprint a cell lies in."""
+STANDING, MOVING = 1, 2  # bits of the flags that say whose footprint a cell lies in
 
 
 class GridSpec(Config):
@@ -57,24 +56,16 @@ def paper_sensors() -> dict[str, SensorConfig]:
 
 
 class GridConfig(Config):
-    """Everything that determines a grid data set, besides the logs.
+    """Everything that determines a grid data set, besides the logs."""
 
-    Args:
-        spec: extent of the grids.
-        sensors: settings by name; a `kind` is a camera where it is left out.
-        target: the sensors whose points, counted together, make the targets. The times of the first are the grids'.
-        integrator: of the egomotion; euler as the paper, arc for constant turn and speed between samples (reading 17).
-        morphology: reading 12.
-        stretch_frames: length of a recording; longer logs are cut (reading 18).
-        class_map: grid class, or none, by Cityscapes label name; replaces single entries of the default (reading 21).
-    """
-
-    spec: GridSpec = GridSpec()
-    sensors: dict[SensorName, Sensor] = Field(default_factory=paper_sensors)
+    spec: GridSpec = GridSpec()  # extent of the grids
+    sensors: dict[SensorName, Sensor] = Field(default_factory=paper_sensors)  # cameras where `kind` is left out
+    # The sensors whose points, counted together, make the targets. The times of the first are the grids'.
     target: tuple[str, ...] = Field(("full",), min_length=1)
-    integrator: Integrator = "euler"
-    morphology: Morphology = "minkowski"
-    stretch_frames: int = Field(30, ge=2, le=100_000)
+    integrator: Integrator = "euler"  # of the egomotion, as in the paper; `EgoMotion` has the other (reading 17)
+    morphology: Morphology = "minkowski"  # reading 12
+    stretch_frames: int = Field(30, ge=2, le=100_000)  # length of a recording; longer logs are cut (reading 18)
+    # Grid class, or none, by Cityscapes label name; replaces single entries of the default (reading 21).
     class_map: dict[str, str | None] = Field(default_factory=dict)
 
     @model_validator(mode="after")

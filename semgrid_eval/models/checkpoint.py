@@ -35,17 +35,16 @@ class EpochRecord(NamedTuple):
 
 
 class TrainingFolder:
-    """The folder of one training, which `key` tells from every other."""
+    """The folder of one training, which `key` tells from every other.
+
+    Reading raises an `InputError` where a file is damaged, missing or another training's.
+    """
 
     def __init__(self, path: Path, key: str) -> None:
         self._path, self._key, self._checkpoint = path, key, path / CHECKPOINT_FILE
 
     def is_complete(self) -> bool:
-        """Tell whether the training was finished.
-
-        Raises:
-            InputError: the weights are damaged or another training's.
-        """
+        """Tell whether the training was finished."""
         weights = self._path / WEIGHTS_FILE
         if not weights.is_file():
             return False
@@ -53,21 +52,13 @@ class TrainingFolder:
         return True
 
     def read(self, network: Network) -> list[EpochRecord]:
-        """Load the weights of a finished training into the network and return its history.
-
-        Raises:
-            InputError: a file is missing or damaged.
-        """
+        """Load the weights of a finished training into the network and return its history."""
         self._checkpoint.unlink(missing_ok=True)  # a stop between the weights and this leaves it
         load_weights(network, self._path / WEIGHTS_FILE)
         return read_history(self._path / HISTORY_FILE)
 
     def restore(self, network: Network, optimizer: torch.optim.Optimizer) -> list[EpochRecord]:
-        """Load the checkpoint into network and optimizer and return the history so far, empty where there is none.
-
-        Raises:
-            InputError: the checkpoint is damaged or another training's.
-        """
+        """Load the checkpoint into network and optimizer and return the history so far, empty where there is none."""
         if not self._checkpoint.is_file():
             return []
         device = next(network.parameters()).device
@@ -122,11 +113,7 @@ def save_weights(network: Network, path: Path, **notes: str) -> None:
 
 
 def load_weights(network: Network, path: Path) -> None:
-    """Load weights that `save_weights` wrote into a network of the same build.
-
-    Raises:
-        InputError: the file is missing, damaged or of another network.
-    """
+    """Load weights that `save_weights` wrote into a network of the same build; an `InputError` says what is wrong."""
     read_header(path)
     try:
         with safe_open(path, framework="pt") as archive:

@@ -99,17 +99,6 @@ def is_out_of_memory(error: BaseException) -> bool:
 
 
 @contextmanager
-def torch_threads(count: int) -> Iterator[None]:
-    """Let torch use as many threads inside the block, and as many as before after it."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
-@contextmanager
 def seeded(seed: int, device: torch.device) -> Iterator[None]:
     """Seed torch's own generators of CPU and device inside the block and restore them after it."""
     with torch.random.fork_rng([device] if device.type == "cuda" else []):

@@ -18,19 +18,12 @@ DROPOUT_RATE = 0.5
 
 
 class EncoderDecoderSettings(NetworkSettings):
-    """Settings of an ED.
+    """Settings of an ED."""
 
-    Args:
-        depth: encoder blocks, d.
-        features: channels of the first block, f.
-        decoder_activation: of the decoder's convolutions (reading 5).
-        constants: whose constants batch normalisation and initial weights follow (reading 7).
-    """
-
-    depth: int = Field(default=3, ge=2, le=6)
-    features: int = Field(default=64, ge=2, le=512)
-    decoder_activation: Activation = "linear"
-    constants: Constants = "keras"
+    depth: int = Field(default=3, ge=2, le=6)  # encoder blocks, d
+    features: int = Field(default=64, ge=2, le=512)  # channels of the first block, f
+    decoder_activation: Activation = "linear"  # of the decoder's convolutions (reading 5)
+    constants: Constants = "keras"  # whose constants batch normalisation and initial weights follow (reading 7)
 
     @field_validator("features")
     @classmethod
@@ -103,9 +96,10 @@ class _Block(nn.Sequential):
 
     def __init__(self, inputs: int, outputs: int, *, activation: Activation, constants: Constants) -> None:
         layers: list[nn.Module] = []
+        eps, momentum = (1e-3, 0.01) if constants == "keras" else (1e-5, 0.1)
         for width in (inputs, outputs):
             # A bias would be removed by the normalisation that follows.
-            layers += [nn.Conv2d(width, outputs, 3, padding=1, bias=False), _normalisation(outputs, constants)]
+            layers += [nn.Conv2d(width, outputs, 3, padding=1, bias=False), nn.BatchNorm2d(outputs, eps, momentum)]
             layers += [nn.ReLU(inplace=True)] if activation == "relu" else []
         super().__init__(*layers)
 
@@ -120,10 +114,6 @@ class _Upsample(nn.Module):
     def forward(self, features: Tensor) -> Tensor:
         larger = F.interpolate(features, scale_factor=2, mode="nearest")
         return torch.as_tensor(self.convolution(F.pad(larger, (0, 1, 0, 1))))
-
-
-def _normalisation(channels: int, constants: Constants) -> nn.BatchNorm2d:
-    return nn.BatchNorm2d(channels, eps=1e-3, momentum=0.01) if constants == "keras" else nn.BatchNorm2d(channels)
 
 
 def _initialise_as_keras(module: nn.Module) -> None:

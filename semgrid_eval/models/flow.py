@@ -31,29 +31,21 @@ _IS_STATIC = np.array([entry.category is Category.STATIC for entry in CLASSES]) 
 
 
 class FlowSettings(Config):
-    """What counts as evidence of motion; a component of cells that lacks any of it stays where BL-Fuse has it.
+    """What counts as evidence of motion; a component of cells that lacks any of it stays where BL-Fuse has it."""
 
-    Args:
-        speed_limit_mps: faster vehicles are taken for a mix-up of two.
-        small_speed_limit_mps: the same for persons and bicycles. By default they stay: even a cyclist comes no
-            farther than two cells between two inputs, and moving them gained nothing on simulated towns.
-        least_cells: smaller components are taken for noise.
-        least_motion_cells: shorter motion is taken for the rounding of grids and of the ego motion.
-        size_ratio: the smaller of two matched components has at least this share of the other's cells.
-        overlap: least intersection over union of the two shapes, one laid over the other.
-        seen: at least this share of the place that was left, and of the place that was taken, is known at the other
-            time: what comes out from behind something else has not moved.
-        still_there: at most this share of the place that was left shows the class still, and of the place that was
-            taken had shown it before: a parked row of which now one car and then another is seen fails here.
-    """
-
-    speed_limit_mps: float = Field(20.0, ge=0, le=100)
+    speed_limit_mps: float = Field(20.0, ge=0, le=100)  # faster vehicles are taken for a mix-up of two
+    # The same for persons and bicycles. By default they stay: even a cyclist comes no farther than two cells between
+    # two inputs, and moving them gained nothing on simulated towns.
     small_speed_limit_mps: float = Field(0.0, ge=0, le=100)
-    least_cells: int = Field(3, ge=1)
-    least_motion_cells: float = Field(2.0, gt=0)
-    size_ratio: float = Field(0.5, ge=0, le=1)
-    overlap: float = Field(0.55, ge=0, le=1)
+    least_cells: int = Field(3, ge=1)  # smaller components are taken for noise
+    least_motion_cells: float = Field(2.0, gt=0)  # shorter motion is taken for rounding, of grids and of ego motion
+    size_ratio: float = Field(0.5, ge=0, le=1)  # least share of the larger of two components that the smaller one has
+    overlap: float = Field(0.55, ge=0, le=1)  # least intersection over union of the two shapes, one laid over the other
+    # At least this share of the place that was left, and of the place that was taken, is known at the other time: what
+    # comes out from behind something else has not moved.
     seen: float = Field(0.65, ge=0, le=1)
+    # At most this share of the place that was left shows the class still, and of the place that was taken had shown it
+    # before: a parked row of which now one car and then another is seen fails here.
     still_there: float = Field(0.1, ge=0, le=1)
 
 

@@ -7,28 +7,20 @@ import torch
 from torch import Tensor
 
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.config import Config
+from semgrid_eval.config import Config, parse_config
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 
 @dataclass(frozen=True)
 class Given:
-    """What a row gives its model, whatever the logs hold.
+    """What a row gives its model, whatever the logs hold."""
 
-    Args:
-        sensors: names of the inputs' sensors, in the order of S.
-        inputs: grids of each sensor, T.
-        rows: of a grid, H, and `columns` W.
-        cell_m: edge of a cell.
-        translate: whether inputs are moved into the target's place.
-    """
-
-    sensors: tuple[str, ...]
-    inputs: int
-    rows: int
-    columns: int
-    cell_m: float
-    translate: bool
+    sensors: tuple[str, ...]  # names of the inputs' sensors, in the order of S
+    inputs: int  # grids of each sensor, T
+    rows: int  # of a grid, H
+    columns: int  # W
+    cell_m: float  # edge of a cell
+    translate: bool  # whether inputs are moved into the target's place
 
     @property
     def grids(self) -> int:
@@ -44,31 +36,33 @@ class Given:
 class Model:
     """Base of all models: subclass it, answer in `predict`, and in `fit` learn from training windows.
 
-    What gradients train is a `models.network.Network`.
-
-    Args:
-        settings: of the class `Settings`, complete.
-        given: what the row gives it.
+    What gradients train is a `models.network.Network`. A model is made with complete settings, of its class `Settings`,
+    and with what the row gives it.
     """
 
-    Settings: ClassVar[type[Config]] = Config
-    """Strict configuration class of what a row may set under `settings`."""
-    words: ClassVar[str] = ""
-    """What it does, for labels; the name of the class, where it does not say."""
-    family: ClassVar[str] = ""
-    """How figures group models, like `BL`; of one's own the name of the class, where it does not say."""
-    baseline: ClassVar[bool] = False
-    """Whether other rows are measured against it."""
-    random: ClassVar[bool] = False
-    """Whether chance plays a part: rows are then repeated with seeds, and torch's generator is seeded with them."""
+    Settings: ClassVar[type[Config]] = Config  # strict configuration class of what a row may set under `settings`
+    words: ClassVar[str] = ""  # what it does, for labels; the name of the class, where it does not say
+    family: ClassVar[str] = (
+        ""  # how figures group models, like `BL`; of one's own the class's name, where it does not say
+    )
+    baseline: ClassVar[bool] = False  # whether other rows are measured against it
+    random: ClassVar[bool] = False  # whether chance plays a part: rows are repeated with seeds of torch's generator
     files: ClassVar[tuple[str, ...] | None] = None
     """Files beside its module that it reads (weights): all of them, so that its results can be kept, or None."""
-    version: ClassVar[str] = "1"
-    """Part of all ids: counted up by whoever changes the numbers of a built-in model."""
+    version: ClassVar[str] = "1"  # part of all ids: counted up by whoever changes the numbers of a built-in model
 
     def __init__(self, settings: Any, given: Given) -> None:  # noqa: ANN401 - of the class `Settings`
         super().__init__()
         self.settings, self.given = settings, given
+
+    @classmethod
+    def parse_settings(cls, values: object, *, path: str | None = None) -> Config:
+        """Complete what a row sets.
+
+        Raises:
+            ConfigError: it is not this model's.
+        """
+        return parse_config(cls.Settings, values, path=path)
 
     @classmethod
     def in_words(cls, settings: Any) -> str:  # noqa: ANN401 - of the class `Settings`

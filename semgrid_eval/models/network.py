@@ -37,14 +37,12 @@ class OptimizerConfig(Config):
 
 
 class ScheduleConfig(Config):
-    """The learning rate, epoch by epoch; the defaults are the paper's.
-
-    Args:
-        drop_epoch: epochs after this many use `rate_after_drop`; None keeps `learning_rate`.
-    """
+    """The learning rate, epoch by epoch; the defaults are the paper's."""
 
     learning_rate: float = Field(default=1e-3, gt=0)
-    drop_epoch: int | None = Field(default=35, ge=0)
+    drop_epoch: int | None = Field(
+        default=35, ge=0
+    )  # epochs after it use `rate_after_drop`; None keeps `learning_rate`
     rate_after_drop: float = Field(default=1e-4, gt=0)
 
     def rate_in(self, epoch: int) -> float:
@@ -54,20 +52,14 @@ class ScheduleConfig(Config):
 
 
 class TrainingConfig(Config):
-    """How a network is trained; the defaults are the paper's (readings 1 and 7).
-
-    Args:
-        updates_per_epoch: batches an epoch; with `epoch_unit: windows` it counts windows instead.
-        clip_norm: limit of the gradient's norm; the paper has none.
-        precision: `auto` takes bfloat16 where the device multiplies in it natively.
-    """
+    """How a network is trained; the defaults are the paper's (readings 1 and 7)."""
 
     epochs: int = Field(default=40, ge=1)
-    updates_per_epoch: int = Field(default=185, ge=1)
+    updates_per_epoch: int = Field(default=185, ge=1)  # batches, or windows with `epoch_unit: windows`
     epoch_unit: Literal["batches", "windows"] = "batches"
     batch: int = Field(default=32, ge=1)
-    precision: Precision = "auto"
-    clip_norm: float | None = Field(default=None, gt=0)
+    precision: Precision = "auto"  # `auto` takes bfloat16 where the device multiplies in it natively
+    clip_norm: float | None = Field(default=None, gt=0)  # limit of the gradient's norm; the paper has none
     optimizer: OptimizerConfig = OptimizerConfig()
     schedule: ScheduleConfig = ScheduleConfig()
 

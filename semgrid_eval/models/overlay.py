@@ -25,13 +25,9 @@ def newest_first(batch: WindowBatch) -> Tensor:
 
 
 class OverlaySettings(Config):
-    """Settings of BL-Sp.
+    """Settings of BL-Sp."""
 
-    Args:
-        top: part of the name of the one sensor that is drawn over the others (reading 20).
-    """
-
-    top: str = Field("upper", min_length=1)
+    top: str = Field("upper", min_length=1)  # part of the name of the sensor that is drawn over the others (reading 20)
 
 
 class OverlaySensors(Baseline):

@@ -1,11 +1,8 @@
-"""Models of one's own: found by file or entry point, and guarded, so that every fault of their code is one line."""
+"""Models of one's own are guarded, so that every fault of their code is one line."""
 
-import importlib.metadata
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, ClassVar
 
 import torch
@@ -14,69 +11,11 @@ from torch import Tensor
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError, SemgridError
-from semgrid_eval.files import digest_files, digest_value
 from semgrid_eval.models.beside import ModelFile
 from semgrid_eval.models.device import is_out_of_memory
 from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.network import Network, NetworkSettings
 from semgrid_eval.windows.data import WindowBatch, WindowSet
-
-ENTRY_POINT_GROUP = "semgrid_eval.models"
-_loaded: dict[str, tuple[ModelFile, type[Model]]] = {}
-
-
-def own_model(name: str) -> type[Model]:
-    """Load the model of `path.py:Class`, whose file is run once and again when it has changed, or of an entry point.
-
-    Raises:
-        InputError: there is no such file, class or entry point, or loading it failed.
-    """
-    if ":" in name:
-        return _from_file(name)[1]
-    with _one_line(name):
-        cls = _entry_point(name).load()
-    return _guarded(cls, name, None)
-
-
-def own_version(name: str) -> str:
-    """Digest what makes a model: its file and what it imports from beside it, and the `files` that it declares.
-
-    Of an installed model it is the version of its package, the module of its class, and the `files`.
-
-    Raises:
-        InputError: it cannot be loaded, or lacks a declared file.
-    """
-    if ":" in name:
-        file, cls = _from_file(name)
-        return digest_files([*file.sources(), *_declared(cls, file.folder, name)])
-    cls, module = own_model(name), Path(str(sys.modules[_entry_point(name).module].__file__))
-    return digest_value([installed_models()[name], digest_files([module, *_declared(cls, module.parent, name)])])
-
-
-def _from_file(spec: str) -> tuple[ModelFile, type[Model]]:
-    if spec not in _loaded or not _loaded[spec][0].is_current():
-        path, _, name = spec.rpartition(":")
-        file = ModelFile(Path(path))
-        with _one_line(path):
-            module = file.load()
-        if not hasattr(module, name):
-            raise InputError(f"defines no {name!r}", path=path)
-        _loaded[spec] = file, _guarded(getattr(module, name), spec, file)
-    return _loaded[spec]
-
-
-def _entry_point(name: str) -> importlib.metadata.EntryPoint:
-    known = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
-    if name not in known.names:
-        names = ", ".join(sorted(known.names)) or "none"
-        raise InputError(f"no model {name!r} is installed ({names} found); a file is given as path.py:Class")
-    return known[name]
-
-
-def installed_models() -> dict[str, str]:
-    """List the models that packages have registered: name -> package and version."""
-    found = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
-    return {entry.name: f"{entry.dist.name} {entry.dist.version}" if entry.dist else "" for entry in found}
 
 
 class _Guarded(Model):
@@ -101,6 +40,11 @@ class _Guarded(Model):
             return scores
 
     @classmethod
+    def parse_settings(cls, values: object, *, path: str | None = None) -> Config:
+        with cls._guard():
+            return super().parse_settings(values, path=path)
+
+    @classmethod
     def in_words(cls, settings: Any) -> str:  # noqa: ANN401 - of the class `Settings`
         with cls._guard():
             return super().in_words(settings)
@@ -113,7 +57,7 @@ class _Guarded(Model):
     @classmethod
     @contextmanager
     def _guard(cls) -> Iterator[None]:
-        with _one_line(cls._own_name), cls._own_file.present() if cls._own_file else nullcontext():
+        with one_line(cls._own_name), cls._own_file.present() if cls._own_file else nullcontext():
             yield
 
     def _checked(self, scores: Tensor, batch: WindowBatch) -> Tensor:
@@ -144,7 +88,7 @@ class _GuardedNetwork(_Guarded, Network):
             return super().optimizer()
 
 
-def _guarded(cls: object, spec: str, file: ModelFile | None) -> type[Model]:
+def guarded(cls: object, spec: str, file: ModelFile | None) -> type[Model]:
     """Put a guard before a class of one's own, after looking whether it is a model at all."""
     if not isinstance(cls, type) or not issubclass(cls, Model):
         raise InputError("is not a class that has `Model` or `Network` as its base", field=spec)
@@ -157,16 +101,8 @@ def _guarded(cls: object, spec: str, file: ModelFile | None) -> type[Model]:
     return type(cls.__name__, (guard, cls), facts | unfitted)
 
 
-def _declared(cls: type[Model], folder: Path, spec: str) -> list[Path]:
-    paths = [folder / name for name in cls.files or ()]
-    for path in paths:
-        if not path.is_file():
-            raise InputError(f"declares the file {path.name}, which is not in {folder}", field=f"{spec}: files")
-    return paths
-
-
 @contextmanager
-def _one_line(name: str) -> Iterator[None]:
+def one_line(name: str) -> Iterator[None]:
     """Turn whatever code of one's own raises into one line, but for a lack of memory, which is not its fault."""
     try:
         yield

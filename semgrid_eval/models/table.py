@@ -8,12 +8,9 @@ from semgrid_eval.models.model import Baseline
 from semgrid_eval.models.overlay import newest_first
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
-GRID_LIMIT = 5
-"""Grids that a table looks at, the newest ones: it has 10 to the power of their number rows."""
-SMOOTHING_CELLS = 50.0
-"""How many cells of what fewer grids suggest are added to the counts of each row."""
-BATCH = 64
-"""Windows that are counted at once."""
+GRID_LIMIT = 5  # grids that a table looks at, the newest ones: it has 10 to the power of their number rows
+SMOOTHING_CELLS = 50.0  # how many cells of what fewer grids suggest are added to the counts of each row
+BATCH = 64  # windows that are counted at once
 
 
 class ClassTable(Baseline):

@@ -21,15 +21,9 @@ from semgrid_eval.windows.grids import GridData, stack_recordings
 
 
 class RunData:
-    """Grids of a folder of logs, made when a row first asks for them.
+    """Grids of a folder of logs, made when a row first asks for them, kept in the folder `cache` and put on `device`.
 
-    Args:
-        logs: the folder of logs.
-        cache: folder in which built grids are kept.
-        rows: all rows of the matrix, which tell the sensors that are needed.
-        executor: builds the logs' grids.
-        device: where the grids of training and validation lie.
-        stage: shows progress.
+    `rows` are all rows of the matrix: they tell which sensors are needed.
     """
 
     def __init__(

@@ -3,36 +3,26 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import torch
-
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.config import Config
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
-from semgrid_eval.models.device import choose_precision
 from semgrid_eval.models.model import Model
-from semgrid_eval.models.network import NetworkSettings
-from semgrid_eval.models.registry import find_model, version_of
 from semgrid_eval.runs.data import grid_digest
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
 
-SCORING_VERSION = 3
-"""Counts changes to how windows are kept and scored; results of another version are made again."""
+SCORING_VERSION = 3  # counts changes to how windows are kept and scored; results of another version are made again
 
 
 @dataclass(frozen=True)
 class Resolved:
-    """The model of a row with its settings.
-
-    Args:
-        version: tells its code, and files that it declares, from others of the same name.
-    """
+    """The model of a row with its settings."""
 
     model: type[Model]
     settings: Config
-    version: str
+    version: str  # tells its code, and files that it declares, from others of the same name
 
     @property
     def is_known(self) -> bool:
@@ -42,78 +32,27 @@ class Resolved:
 
 @dataclass(frozen=True)
 class Training:
-    """What a row's model learns from; rows that ask for the same share it.
-
-    Args:
-        folder: of a network's weights and history.
-        watched: the windows whose loss a network's training notes.
-    """
+    """What a row's model learns from; rows that ask for the same share it."""
 
     id: str
-    folder: Path
+    folder: Path  # of a network's weights and history
     windows: WindowSet
-    watched: WindowSet | None
+    watched: WindowSet | None  # the windows whose loss a network's training notes
 
 
 @dataclass(frozen=True)
 class Job:
-    """A row with one seed, resolved.
-
-    Args:
-        result_id: names the result's folder.
-        config: what determined it, for the record.
-        scored: validation windows; `windows_id` names their file.
-        training: what is learned from, if anything.
-        left_out: logs whose recordings are too short for the row's windows, and by how much.
-    """
+    """A row with one seed, resolved."""
 
     row: Row
     seed: int | None
     resolved: Resolved
-    result_id: str
-    config: dict[str, object]
-    scored: WindowSet
+    result_id: str  # names the result's folder
+    config: dict[str, object]  # what determined it, for the record
+    scored: WindowSet  # validation windows; `windows_id` names their file
     windows_id: str
-    training: Training | None
-    left_out: dict[str, str]
-
-
-def resolve(row: Row) -> Resolved:
-    """Find a row's model.
-
-    Raises:
-        InputError: it cannot be loaded, or a file that it declares is missing.
-        ConfigError: it does not take the row's settings.
-    """
-    model = find_model(row.model)
-    return Resolved(model, row.settings_of(model), version_of(row.model))
-
-
-def id_of_training(
-    resolved: Resolved,
-    row: Row,
-    seed: int | None,
-    device: torch.device,
-    *,
-    threads: int,
-    windows: WindowSet,
-    watched: WindowSet | None,
-) -> str:
-    """Digest all that decides what a model learns."""
-    settings = resolved.settings
-    trained_in = choose_precision(settings.training.precision, device) if isinstance(settings, NetworkSettings) else ""
-    return digest_value(
-        {
-            "model": [resolved.model.__name__, resolved.version, settings.model_dump(mode="json")],
-            "precision": str(trained_in),
-            "device": device.type,
-            # Sums on a CPU are rounded by how many threads share them.
-            "threads": threads if device.type == "cpu" else None,
-            "seed": seed,
-            "windows": [windows.digest(), watched.digest() if watched else None],
-            "grids": [GRIDS, grid_digest(row.grid), list(CLASS_NAMES)],
-        }
-    )
+    training: Training | None  # what is learned from, if anything
+    left_out: dict[str, str]  # logs whose recordings are too short for the row's windows, and by how much
 
 
 def id_of_windows(row: Row, scored: WindowSet) -> str:

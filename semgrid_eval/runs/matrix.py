@@ -31,22 +31,16 @@ class _Axes(Config):
 
 
 class _MatrixFile(Config):
-    """What a matrix file may hold.
+    """What a matrix file may hold."""
 
-    Args:
-        extends: a preset, or a file beside this one, whose rows, defaults, models and seed this one starts from.
-            Defaults and models are merged key by key; so is a row into the base's row of the same written name; other
-            rows come after those.
-        without: written names of the base's rows to leave out.
-        title: the name of the file if not given, also where it extends another.
-        models: settings of models by name, under those of every row of that model.
-    """
-
+    # A preset, or a file beside this one, whose rows, defaults, models and seed this one starts from. Defaults and
+    # models are merged key by key; so is a row into the base's row of the same written name; other rows come after
+    # those.
     extends: str | None = None
-    without: list[str] = Field(default_factory=list)
-    title: str = Field("", max_length=200)
+    without: list[str] = Field(default_factory=list)  # written names of the base's rows to leave out
+    title: str = Field("", max_length=200)  # the name of the file if not given, also where it extends another
     seed: int | None = Field(None, ge=0)
-    models: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    models: dict[str, dict[str, Any]] = Field(default_factory=dict)  # settings by model, under those of its rows
     defaults: dict[str, Any] = Field(default_factory=dict)
     rows: list[dict[str, Any]] = Field(default_factory=list)
 
@@ -97,7 +91,6 @@ def _load(name: str, *above: Path) -> tuple[Path, object]:
 
 
 def _extended(base: _MatrixFile, file: _MatrixFile, path: Path) -> _MatrixFile:
-    """Put a file over the one that it extends."""
     names = [_written_name(row) for row in base.rows]
     for name in file.without:
         if name not in names:

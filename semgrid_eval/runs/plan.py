@@ -5,17 +5,18 @@ from collections import defaultdict
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import torch
+
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.checkpoint import HISTORY_FILE, read_history
-from semgrid_eval.models.device import torch_threads
 from semgrid_eval.models.network import Network, NetworkSettings, ScheduleConfig, TrainingConfig, seeded_network
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.runs.job import Job, Training
 from semgrid_eval.runs.matrix import Matrix
-from semgrid_eval.runs.runner import failure_of, make_worker
-from semgrid_eval.runs.units import RunOptions, Unit, plan_units, units_of, wanted_rows
+from semgrid_eval.runs.row import Unit, plan_units, units_of
+from semgrid_eval.runs.runner import RunOptions, failure_of, make_worker, wanted_rows
 from semgrid_eval.runs.worker import Worker
 
 SAMPLE = {"epochs": 3, "updates_per_epoch": 4, "epoch_unit": "batches", "schedule": ScheduleConfig()}
@@ -26,24 +27,16 @@ SCORING_SHARE = 0.4
 
 @dataclass(frozen=True)
 class PlannedUnit:
-    """A row with one seed.
+    """A row with one seed."""
 
-    Args:
-        rows: names of the rows that share it.
-        updates: still to be made, 0 where nothing is left to train or a unit before it trains the same.
-        samples: windows to be seen by them.
-        seconds: estimated; 0 where the result or the training is there already.
-        failure: why it cannot be run.
-    """
-
-    rows: tuple[str, ...]
+    rows: tuple[str, ...]  # names of the rows that share it
     seed: int | None
     windows: int
-    updates: int
-    samples: int
-    seconds: float
+    updates: int  # still to be made, 0 where nothing is left to train or a unit before it trains the same
+    samples: int  # windows to be seen by them
+    seconds: float  # estimated; 0 where the result or the training is there already
     done: bool
-    failure: str | None = None
+    failure: str | None = None  # why it cannot be run
 
 
 def plan_run(
@@ -125,8 +118,13 @@ class _Speed:
     def _measure(self, job: Job, sample: NetworkSettings) -> float:
         assert job.training is not None
         assert issubclass(job.resolved.model, Network)
-        with tempfile.TemporaryDirectory() as folder, torch_threads(self._worker.threads):
-            network = seeded_network(job.resolved.model, sample, job.row.given, seed=0)
-            path = Path(folder) / "sample"
-            trained = train(network, job.training.windows, seed=0, device=self._worker.device, folder=path)
+        network = seeded_network(job.resolved.model, sample, job.row.given, seed=0)
+        threads = torch.get_num_threads()
+        torch.set_num_threads(self._worker.threads)
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                windows, device = job.training.windows, self._worker.device
+                trained = train(network, windows, seed=0, device=device, folder=Path(folder))
+        finally:
+            torch.set_num_threads(threads)
         return min(epoch.seconds for epoch in trained.history) / sample.training.updates_per_epoch

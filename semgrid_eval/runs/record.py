@@ -15,22 +15,11 @@ import torch
 import semgrid_eval
 from semgrid_eval.packages import installed_versions
 from semgrid_eval.runs.matrix import Matrix
-from semgrid_eval.runs.row import Row
-from semgrid_eval.runs.units import units_of
+from semgrid_eval.runs.row import Row, units_of
 from semgrid_eval.runs.worker import Worker
 from semgrid_eval.scores import results
 
-_NEEDED = [
-    "torch",
-    "numpy",
-    "numba",
-    "opencv-python-headless",
-    "mcap",
-    "protobuf",
-    "pandas",
-    "eclipse-sumo",
-    "embreex",
-]
+_NEEDED = ["torch", "numpy", "numba", "opencv-python-headless", "mcap", "protobuf", "pandas", "eclipse-sumo", "embreex"]
 
 
 class Outcome(NamedTuple):

@@ -1,23 +1,19 @@
-"""One row of a matrix: an experiment with everything that determines it, and what it says of itself."""
+"""A row of a matrix: an experiment with everything that determines it; with one seed, it is a unit of a run."""
 
-from typing import Any, Self
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from semgrid_eval.config import Config, parse_config
+from semgrid_eval.config import Config
 from semgrid_eval.errors import ConfigError, InputError
+from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.model import Given, Model
-from semgrid_eval.models.own import installed_models
-from semgrid_eval.models.registry import MODELS, find_model, is_named
+from semgrid_eval.models.registry import MODELS, find_model, installed_models, is_named
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.results import RowFacts
-from semgrid_eval.windows.plan import WindowConfig
-
-
-def _target_sensors(known: dict[str, Any]) -> tuple[str, ...]:
-    """Return the sensors of the target of a row's grid, none where that is at fault itself."""
-    return known["grid"].target if "grid" in known else ()
+from semgrid_eval.windows.data import WindowConfig
 
 
 def _found(model: str) -> type[Model] | None:
@@ -28,31 +24,24 @@ def _found(model: str) -> type[Model] | None:
 
 
 class Row(Config):
-    """One experiment with everything that determines it.
+    """One experiment with everything that determines it."""
 
-    Args:
-        name: unique in the matrix, like `ED-Sp2`; axes fill in `{key}` places.
-        model: name of a built-in or installed model, or `path.py:Class` of one's own.
-        settings: of the model, complete unless its code cannot be loaded.
-        sensors: inputs, from the grid config's sensors; those of its target if not given.
-        translate: whether inputs are moved to the target's time (T2); the paper's NT rows do not.
-        mask_mode: what becomes of the mask M in scores (reading 9).
-        repeats: seeds of a model in which chance plays a part.
-        validation_window: where it differs from `window`, for recordings of another frame rate; what a file leaves out
-            is as in `window`, and the number of inputs has to be.
-    """
-
-    name: str = Field(min_length=1, max_length=200)
-    model: str
-    settings: dict[str, Any] = Field(default_factory=dict, validate_default=True)
+    name: str = Field(min_length=1, max_length=200)  # unique in the matrix, like `ED-Sp2`; axes fill in `{key}` places
+    model: str  # name of a built-in or installed model, or `path.py:Class` of one's own
+    settings: dict[str, Any] = Field(default_factory=dict, validate_default=True)  # complete if its code can be loaded
     grid: GridConfig = GridConfig()
-    sensors: tuple[str, ...] = Field(default_factory=_target_sensors, min_length=1)
-    translate: bool = True
-    mask_mode: MaskMode = "exclude"
-    repeats: int = Field(1, ge=1, le=1000)
+    # Of the inputs; those of the target if not given. A grid that is at fault itself is not among what is known.
+    sensors: tuple[str, ...] = Field(
+        default_factory=lambda known: known["grid"].target if "grid" in known else (), min_length=1
+    )
+    translate: bool = True  # whether inputs are moved to the target's time (T2); the paper's NT rows do not
+    mask_mode: MaskMode = "exclude"  # what becomes of the mask M in scores (reading 9)
+    repeats: int = Field(1, ge=1, le=1000)  # seeds of a model in which chance plays a part
     train_split: str = "train"
     validation_split: str = "val"
     window: WindowConfig = WindowConfig()
+    # Where it differs from `window`, for recordings of another frame rate; what a file leaves out is as in `window`,
+    # and the number of inputs has to be.
     validation_window: WindowConfig | None = None
 
     @field_validator("settings")
@@ -61,7 +50,7 @@ class Row(Config):
         if not (model := _found(info.data.get("model", ""))):
             return settings
         try:
-            return parse_config(model.Settings, settings).model_dump(mode="json")
+            return model.parse_settings(settings).model_dump(mode="json")
         except ConfigError as error:
             raise ConfigError(f"settings.{error}".replace("settings.(top level)", "settings")) from None
 
@@ -76,7 +65,7 @@ class Row(Config):
         if self.scored_window.inputs != self.window.inputs:
             raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
         if found := self.found_model():
-            found.check(self.settings_of(found), self.given)
+            found.check(found.parse_settings(self.settings), self.given)
         return self
 
     @property
@@ -93,14 +82,6 @@ class Row(Config):
     def found_model(self) -> type[Model] | None:
         """Return the class of the row's model, None where its code cannot be loaded."""
         return _found(self.model)
-
-    def settings_of(self, model: type[Model]) -> Config:
-        """Return the settings as the model takes them.
-
-        Raises:
-            ConfigError: they are not this model's.
-        """
-        return parse_config(model.Settings, self.settings)
 
     def identity(self) -> dict[str, object]:
         """Return what determines the row's numbers, besides code and logs: all but its name and repeats."""
@@ -128,9 +109,33 @@ class Row(Config):
         found = self.found_model()
         horizon = self.scored_window.horizon_steps
         parts = [
-            found.in_words(self.settings_of(found)) if found else self.model,
+            found.in_words(found.parse_settings(self.settings)) if found else self.model,
             "moved to the target's time" if self.translate else "not moved",
             f"{self.window.inputs} inputs",
             f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead",
         ]
         return f"{self.name} ({', '.join(parts)})"
+
+
+class Unit(NamedTuple):
+    """A row with one seed; `seed` is None where chance plays no part."""
+
+    row: Row
+    seed: int | None
+
+
+def plan_units(rows: Iterable[Row], first_seed: int) -> dict[str, Unit]:
+    """List the distinct units of rows by key; rows that mean the same share them."""
+    units: dict[str, Unit] = {}
+    for row in rows:
+        for key, unit in units_of(row, first_seed):
+            units.setdefault(key, unit)
+    return units
+
+
+def units_of(row: Row, first_seed: int) -> Iterator[tuple[str, Unit]]:
+    """Return the units of a row with the keys by which rows that mean the same share them."""
+    model = row.found_model()
+    seeds = range(first_seed, first_seed + row.repeats) if model and model.random else [None]
+    for seed in seeds:
+        yield digest_value([row.identity(), seed]), Unit(row, seed)

@@ -1,14 +1,16 @@
 """Runs a matrix: tries its units here or wherever an executor sends them, and keeps the record as it goes."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from functools import lru_cache, partial
 from pathlib import Path
 
 import torch
 
-from semgrid_eval.errors import SemgridError, first_line
-from semgrid_eval.executors import NoRoomError, WorkerDied
+from semgrid_eval.errors import ConfigError, SemgridError, first_line
+from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.device import choose_device, is_out_of_memory, settle_process
 from semgrid_eval.models.registry import MODELS
@@ -16,12 +18,28 @@ from semgrid_eval.progress import Progress, Stage, silent, silent_stage
 from semgrid_eval.runs.data import RunData
 from semgrid_eval.runs.matrix import Matrix
 from semgrid_eval.runs.record import Clock, Outcome, run_record
-from semgrid_eval.runs.row import Row
+from semgrid_eval.runs.row import Row, Unit, plan_units
 from semgrid_eval.runs.thumbnails import keep_pictures
-from semgrid_eval.runs.units import RunOptions, Unit, plan_units, wanted_rows
 from semgrid_eval.runs.worker import Worker
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a matrix is run; but for the logs to score, nothing here changes its numbers on one machine."""
+
+    device: str  # `auto`, `cpu`, `cuda`, `cuda:1`, ...
+    grids: Path  # folder in which grids are kept
+    command: str  # how the run was started, for the record
+    only: tuple[str, ...] = ()  # names or patterns of rows, all where it is empty; what others have is kept on record
+    executor: Executor = field(default_factory=InProcess)  # where rows are trained and scored
+    grid_executor: Executor = field(default_factory=InProcess)  # where grids are built and pictures made small
+    pictures: bool = True  # whether to keep small pictures of the windows' frames for the report
+    validation_logs: Path | None = None  # folder of the logs to score, where they are not among those to train on
+    trainings: Path | None = (
+        None  # their folder, the run's own if not given; what another run has trained is found there
+    )
 
 
 def run_matrix(
@@ -67,6 +85,21 @@ def run_matrix(
     return keep_record()
 
 
+def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:
+    """Return the rows that are asked for by names or patterns like `BL-*`, all of them where nothing is asked for.
+
+    Raises:
+        ConfigError: a name or pattern fits no row.
+    """
+    # A name may itself hold signs of patterns.
+    found = {each: [row for row in matrix.rows if row.name == each or fnmatchcase(row.name, each)] for each in only}
+    for pattern, rows in found.items():
+        if not rows:
+            names = ", ".join(sorted(row.name for row in matrix.rows))
+            raise ConfigError(f"{pattern!r} is not a row of this matrix: {names}", field="row")
+    return [row for row in matrix.rows if not only or any(row in rows for rows in found.values())]
+
+
 def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[WindowSet, GridConfig]]:
     """Return the windows of rows that have some, and how their grids were made."""
     for row in rows:
@@ -75,11 +108,7 @@ def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[Windo
 
 
 def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:
-    """Make a worker of this process for the units of a matrix; it builds or reads grids when they are asked for.
-
-    Raises:
-        InputError: there is no log at all, or the device does not exist.
-    """
+    """Make a worker of this process for the units of a matrix; it builds or reads grids when they are asked for."""
     settle_process()
     device = choose_device(options.device)
     # Where others do the work, the grids here need no room on the device.

@@ -50,9 +50,8 @@ def keep_pictures(
 ) -> None:
     """Make sure that the pictures of all frames of windows lie in the run's folder, as far as the logs have them.
 
-    Logs that are gone, damaged or not what they were give none: a run needs no pictures.
-
-    `windows` are sets of them, each with how its grids were made.
+    Logs that are gone, damaged or not what they were give none: a run needs no pictures. Windows come with how their
+    grids were made.
 
     Raises:
         InputError: the folder cannot be written to.

@@ -3,36 +3,37 @@
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import torch
 
 from semgrid_eval.arrays import write_arrays
+from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import atomic_folder, digest_value
+from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
-from semgrid_eval.models.device import seeded
+from semgrid_eval.models.device import choose_precision, seeded
 from semgrid_eval.models.model import Model, parameter_count
-from semgrid_eval.models.network import Network, seeded_network
+from semgrid_eval.models.network import Network, NetworkSettings, seeded_network
+from semgrid_eval.models.registry import find_model, version_of
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.data import RunData, grid_digest
-from semgrid_eval.runs.job import (
-    SCORING_VERSION,
-    Job,
-    Resolved,
-    Training,
-    id_of_training,
-    id_of_windows,
-    resolve,
-    target_key,
-    window_records,
-)
+from semgrid_eval.runs.job import SCORING_VERSION, Job, Resolved, Training, id_of_windows, target_key, window_records
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
-from semgrid_eval.windows.data import WindowSet, select_windows, window_arrays
-from semgrid_eval.windows.plan import WindowConfig, WindowPlan, training_windows, validation_windows
+from semgrid_eval.windows.data import (
+    WindowConfig,
+    WindowPlan,
+    WindowSet,
+    select_windows,
+    training_windows,
+    validation_windows,
+    window_arrays,
+)
 
 WindowPlanner = Callable[[Sequence[int], WindowConfig], WindowPlan]
 
@@ -42,24 +43,16 @@ class Worker:
     """Fits and scores single units; holds the grids that they share.
 
     Its methods raise a `SemgridError` where a row cannot be run; the message says why.
-
-    Args:
-        out: folder of the run, and `trainings` that of the trainings.
-        training_data: the grids to train on, and `scored_data` those to score on, mostly the same.
-        device: where models run.
-        threads: of numeric libraries where the units are worked on, which may be another process.
-        example_seed: of the results whose predictions are kept for a report's examples.
-        stage: shows progress.
     """
 
-    out: Path
-    trainings: Path
-    training_data: RunData
-    scored_data: RunData
-    device: torch.device
-    threads: int
-    example_seed: int
-    stage: Stage
+    out: Path  # folder of the run
+    trainings: Path  # folder of the trainings
+    training_data: RunData  # the grids to train on
+    scored_data: RunData  # the grids to score on, mostly the same
+    device: torch.device  # where models run
+    threads: int  # of numeric libraries where the units are worked on, which may be another process
+    example_seed: int  # of the results whose predictions are kept for a report's examples
+    stage: Stage  # shows progress
     _selected: dict[object, tuple[WindowSet, dict[int, str]]] = field(default_factory=dict, init=False)
     # Ids of the windows that are known to lie in the run's folder.
     _kept: set[str] = field(default_factory=set, init=False)
@@ -71,7 +64,8 @@ class Worker:
 
     def look(self, row: Row, seed: int | None) -> Job:
         """Resolve a row with one seed into its model, its windows, its training and the id of its result."""
-        resolved = resolve(row)
+        model = find_model(row.model)
+        resolved = Resolved(model, model.parse_settings(row.settings), version_of(row.model))
         scored, left_out = self.scored_windows(row)
         windows_id = id_of_windows(row, scored)
         training = self._training(resolved, row, seed, scored) if resolved.model.learns() else None
@@ -141,37 +135,40 @@ class Worker:
     def _training(self, resolved: Resolved, row: Row, seed: int | None, scored: WindowSet) -> Training:
         windows = self._select(self.training_data, row, row.train_split, row.window, training_windows)[0]
         watched = self._watched(row, scored) if issubclass(resolved.model, Network) else None
-        training_id = id_of_training(
-            resolved, row, seed, self.device, threads=self.threads, windows=windows, watched=watched
+        # All that decides what a model learns.
+        settings, precision = resolved.settings, ""
+        if isinstance(settings, NetworkSettings):
+            precision = str(choose_precision(settings.training.precision, self.device))
+        training_id = digest_value(
+            {
+                "model": [resolved.model.__name__, resolved.version, settings.model_dump(mode="json")],
+                "precision": precision,
+                "device": self.device.type,
+                # Sums on a CPU are rounded by how many threads share them.
+                "threads": self.threads if self.device.type == "cpu" else None,
+                "seed": seed,
+                "windows": [windows.digest(), watched.digest() if watched else None],
+                "grids": [GRIDS, grid_digest(row.grid), list(CLASS_NAMES)],
+            }
         )
         return Training(training_id, self.trainings / training_id, windows, watched)
 
     def _fitted(self, job: Job) -> tuple[Model, float | None]:
         """Return the job's model, ready to predict, and how many seconds gradients have trained it."""
-        made, settings = job.resolved.model, job.resolved.settings
-        if job.training and issubclass(made, Network):
-            return self._trained(seeded_network(made, settings, job.row.given, job.seed or 0), job.training, job)
+        made, settings, training, seed = job.resolved.model, job.resolved.settings, job.training, job.seed or 0
+        if training and issubclass(made, Network):
+            network = seeded_network(made, settings, job.row.given, seed)
+            train_it = partial(train, network, training.windows, seed=seed, device=self.device, folder=training.folder)
+            with self.stage(f"train {job.row.name} (seed {seed})") as progress:
+                trained = train_it(progress=progress, validation=training.watched)
+            return trained.network, round(trained.seconds, 3)
         model = made(settings, job.row.given)
         if isinstance(model, torch.nn.Module):
             model.to(self.device).eval()
-        if job.training:
+        if training:
             with self.stage(f"fit {job.row.name}"):
-                model.fit(job.training.windows)
+                model.fit(training.windows)
         return model, None
-
-    def _trained(self, network: Network, training: Training, job: Job) -> tuple[Network, float]:
-        seed = job.seed or 0
-        with self.stage(f"train {job.row.name} (seed {seed})") as progress:
-            trained = train(
-                network,
-                training.windows,
-                seed=seed,
-                device=self.device,
-                folder=training.folder,
-                progress=progress,
-                validation=training.watched,
-            )
-        return trained.network, round(trained.seconds, 3)
 
     def _result_record(
         self, job: Job, model: Model, train_seconds: float | None, predict_seconds: float

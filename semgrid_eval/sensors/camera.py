@@ -15,28 +15,20 @@ from semgrid_eval.sensors.sensor import Points, SensorConfig
 
 if TYPE_CHECKING:
     from semgrid_eval.log.reader import LogReader
-    from semgrid_eval.recording.types import CameraFrame
 
 _SIZE_PX = (16, 8192)
 
 
 class CameraSensor(SensorConfig):
-    """A rectangle of a camera's image, in pixels of the resized image, ends exclusive.
-
-    Args:
-        camera: its name in the log; None takes a log's only one.
-        image_size_px: width and height to which labels and disparity are brought before projection (reading 22).
-        top_px: first row, and `left_px` first column.
-        bottom_px: end of the rows, and `right_px` of the columns; None reaches to the edge.
-    """
+    """A rectangle of a camera's image, in pixels of the resized image, ends exclusive."""
 
     kind: Literal["camera"] = "camera"
-    camera: str | None = None
-    image_size_px: tuple[int, int] = (512, 256)
+    camera: str | None = None  # its name in the log; None takes a log's only one
+    image_size_px: tuple[int, int] = (512, 256)  # to which labels and disparity are brought first (reading 22)
     top_px: int = Field(0, ge=0)
-    bottom_px: int | None = None
+    bottom_px: int | None = None  # None reaches to the edge
     left_px: int = Field(0, ge=0)
-    right_px: int | None = None
+    right_px: int | None = None  # None reaches to the edge
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -73,11 +65,7 @@ class CameraSensor(SensorConfig):
 def read_cameras(
     log: "LogReader", sensors: Mapping[str, CameraSensor], class_by_label: NDArray[np.uint8]
 ) -> Iterator[Points]:
-    """Iterate over what parts of cameras' images see, each image decoded once.
-
-    Raises:
-        LogError: there is no such camera, what is read is damaged, or a frame has no labels.
-    """
+    """Iterate over what parts of cameras' images see, each image decoded once, as `Kind` says."""
     by_camera: dict[str, dict[str, CameraSensor]] = {}
     for name, sensor in sensors.items():
         by_camera.setdefault(log.choose_camera(sensor.camera), {})[name] = sensor
@@ -106,18 +94,12 @@ def _read_camera(
     sizes_px = dict.fromkeys(sensor.image_size_px for sensor in sensors.values())
     projections = {size_px: Projection(log.calibration(camera), size_px, class_by_label) for size_px in sizes_px}
     for frame in log.frames(camera):
-        disparity, label = decode_gray(frame.disparity_png, bit_depth=16), decode_gray(_label_png(frame), bit_depth=8)
+        if not frame.label_png:
+            place = f"frame at {frame.stamp_ns} ns"
+            raise LogError("has no label image; add labels to the log (convert cityscapes --labels DIR)", field=place)
+        disparity, label = decode_gray(frame.disparity_png, bit_depth=16), decode_gray(frame.label_png, bit_depth=8)
         seen = {size_px: projection.points(disparity, label) for size_px, projection in projections.items()}
         for name, sensor in sensors.items():
             top, bottom, left, right = sensor.crop_px
             pixels, part = seen[sensor.image_size_px], np.s_[top:bottom, left:right]
             yield Points(name, frame.stamp_ns, pixels.forward_m[part], pixels.left_m[part], pixels.class_id[part])
-
-
-def _label_png(frame: "CameraFrame") -> bytes:
-    if not frame.label_png:
-        raise LogError(
-            "has no label image; add labels to the log (convert cityscapes --labels DIR)",
-            field=f"frame at {frame.stamp_ns} ns",
-        )
-    return frame.label_png

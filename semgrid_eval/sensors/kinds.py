@@ -1,8 +1,8 @@
-"""The kinds of sensors: who adds one adds its line to `KINDS`."""
+"""The kinds of sensors, and what all of them saw at the times of one: who adds a kind adds its line to `KINDS`."""
 
 import heapq
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 
 KINDS: dict[str, Kind] = {"camera": Kind(CameraSensor, read_cameras)}
 _DEFAULT_KIND = "camera"
+TOLERANCE_NS = 1_000_000
+"""Cameras that are triggered together do not stamp alike: what is this much later is taken for simultaneous."""
 
 
 def _of_its_kind(value: object) -> object:
-    """Turn a mapping into the settings of its kind."""
     if not isinstance(value, Mapping):
         return value
     kind = value.get("kind", _DEFAULT_KIND)
@@ -50,3 +51,29 @@ def read_points(
         by_kind.setdefault(sensor.kind, {})[name] = sensor
     streams = [KINDS[kind].read(log, chosen, class_by_label) for kind, chosen in by_kind.items()]
     return heapq.merge(*streams, key=lambda points: points.stamp_ns)
+
+
+def synchronise(
+    observations: Iterable[Points], sensors: Mapping[str, SensorConfig], leader: str
+) -> Iterator[tuple[int, dict[str, Points]]]:
+    """Iterate over the times of the leading sensor with the newest observation that each sensor had made by then.
+
+    Observations are of all sensors, in the order of time; `sensors` say how old one may be: who has none is left out.
+    """
+    newest: dict[str, Points] = {}
+    now: Points | None = None
+
+    def snapshot(now: Points) -> tuple[int, dict[str, Points]]:
+        ages_ns = {name: now.stamp_ns - points.stamp_ns for name, points in newest.items()}
+        recent = [name for name, age_ns in ages_ns.items() if age_ns <= sensors[name].max_age_s * 1e9]
+        return now.stamp_ns, {name: newest[name] for name in recent}
+
+    for points in observations:
+        if now is not None and (points.sensor == leader or points.stamp_ns > now.stamp_ns + TOLERANCE_NS):
+            yield snapshot(now)
+            now = None
+        newest[points.sensor] = points
+        if points.sensor == leader:
+            now = points
+    if now is not None:
+        yield snapshot(now)

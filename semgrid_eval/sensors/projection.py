@@ -48,11 +48,14 @@ class Projection:
         width, height = self._size_px
         forward_m, left_m = np.empty((height, width)), np.empty((height, width))
         class_id = np.empty((height, width), np.uint8)
+        shape = disparity.shape
+        if shape not in self._slopes:
+            self._slopes[shape] = ground_slope(self._calibration, (shape[1], shape[0]), self._size_px)
         _project(
-            (disparity, *self._sides(disparity.shape)),
+            (disparity, *self._sides(shape)),
             (label, *self._sides(label.shape)),
             self._class_by_label,
-            (self._slope(disparity.shape), self._origin_m, self._depth_disparity_m_px),
+            (self._slopes[shape], self._origin_m, self._depth_disparity_m_px),
             (forward_m, left_m, class_id),
         )
         return Pixels(forward_m, left_m, class_id)
@@ -60,11 +63,6 @@ class Projection:
     def _sides(self, shape: tuple[int, ...]) -> _Sides:
         width, height = self._size_px
         return nearest_indices(shape[0], height), nearest_indices(shape[1], width)
-
-    def _slope(self, shape: tuple[int, ...]) -> Floats:
-        if shape not in self._slopes:
-            self._slopes[shape] = ground_slope(self._calibration, (shape[1], shape[0]), self._size_px)
-        return self._slopes[shape]
 
 
 def ground_slope(

@@ -15,15 +15,10 @@ if TYPE_CHECKING:  # whoever reads settings alone needs no reader of logs
 
 
 class SensorConfig(Config):
-    """Settings that sensors of all kinds have.
+    """Settings that sensors of all kinds have."""
 
-    Args:
-        kind: one of `semgrid_eval.sensors.kinds.KINDS`.
-        max_age_s: how old an observation may be at the time of a grid; an older one is left out.
-    """
-
-    kind: str
-    max_age_s: float = Field(0.2, ge=0.0, le=10.0)
+    kind: str  # one of `semgrid_eval.sensors.kinds.KINDS`
+    max_age_s: float = Field(0.2, ge=0.0, le=10.0)  # what is older at the time of a grid is left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,20 +26,14 @@ class Points:
     """What one sensor saw at one time.
 
     The arrays have one shape, (N,) or, for images, (H, W).
-
-    Args:
-        sensor: its name in the grid's configuration.
-        stamp_ns: when the points were seen.
-        forward_m: float64, and `left_m`, in the vehicle frame of that time (ISO 8855, origin on the ground under the
-            rear axle).
-        class_id: uint8 grid class; where it is `NO_POINT` there is nothing, whatever the coordinates say.
     """
 
-    sensor: str
-    stamp_ns: int
+    sensor: str  # its name in the grid's configuration
+    stamp_ns: int  # when the points were seen
+    # float64, and `left_m`, in the vehicle frame of that time (ISO 8855, origin on the ground under the rear axle).
     forward_m: NDArray[np.float64]
     left_m: NDArray[np.float64]
-    class_id: NDArray[np.uint8]
+    class_id: NDArray[np.uint8]  # where it is `NO_POINT` there is nothing, whatever the coordinates say
 
 
 ReadPoints = Callable[["LogReader", Mapping[str, Any], NDArray[np.uint8]], Iterator[Points]]
@@ -52,14 +41,10 @@ ReadPoints = Callable[["LogReader", Mapping[str, Any], NDArray[np.uint8]], Itera
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of sensor.
+    """A kind of sensor."""
 
-    Args:
-        config: class of its settings.
-        read: takes an open log, the settings of all sensors of the kind by name, and the table (256,) from label id to
-            grid class, and iterates over all that they saw in the order of time. Sensors that share data come together,
-            so that it is read and decoded once.
-    """
-
-    config: type[SensorConfig]
+    config: type[SensorConfig]  # class of its settings
+    # Takes an open log, the settings of all sensors of the kind by name, and the table (256,) from label id to grid
+    # class, and iterates over all that they saw in the order of time. Sensors that share data come together, so that it
+    # is read and decoded once.
     read: ReadPoints

@@ -1,4 +1,4 @@
-"""The grids of all recordings in one block of memory, with where the vehicle and the true actors are."""
+"""The grids of all recordings in one block of memory, moved by the ego motion (T2), and the mask M."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,48 +9,33 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.errors import InputError
-from semgrid_eval.windows.shift import shift_grids, shift_in_cells
 
 if TYPE_CHECKING:  # building grids needs the log readers; using built ones does not
     from semgrid_eval.grids.recording import GridRecording
 
+# How long an actor's footprints stay near a target. That holds all ghosts that rows of the paper can leave: five
+# inputs, or a horizon three steps longer, reach back 25 frames, 1.47 s.
 GHOST_S = 1.5
-"""How long an actor's footprints stay near a target.
-
-That holds all ghosts that rows of the paper can leave: five inputs, or a horizon three steps longer, reach back 25
-frames, 1.47 s.
-"""
 
 
 @dataclass(frozen=True)
 class GridData:
-    """The grids of all recordings on one device, recordings one after the other along F.
+    """The grids of all recordings on one device, recordings one after the other along F."""
 
-    Args:
-        grids: (S, F, H, W) uint8 class ids.
-        sensors: names along S.
-        target: which of them the targets come from.
-        recordings: names of the recordings, and `logs` the paths of their logs.
-        digests: of those logs.
-        first_frames: (R + 1,) where each recording begins along F, and F.
-        stamps_ns: (F,) int64.
-        position_m: (F, 2) float64, forward and left in the grid orientation of the frame's own recording.
-        cell_m: edge of a cell.
-        actors: for each recording (its F, H, W) flags of true actors, None where its log does not hold the truth.
-            They stay on the host: scores are split by them, and nothing is predicted from them.
-    """
-
-    grids: Tensor
-    sensors: tuple[str, ...]
-    target: str
-    recordings: tuple[str, ...]
-    logs: tuple[str, ...]
-    digests: tuple[str, ...]
-    first_frames: NDArray[np.int64]
-    stamps_ns: NDArray[np.int64]
-    position_m: NDArray[np.float64]
-    cell_m: float
+    grids: Tensor  # (S, F, H, W) uint8 class ids
+    sensors: tuple[str, ...]  # names along S
+    target: str  # which of them the targets come from
+    recordings: tuple[str, ...]  # names of the recordings
+    logs: tuple[str, ...]  # paths of their logs
+    digests: tuple[str, ...]  # of those logs
+    first_frames: NDArray[np.int64]  # (R + 1,) where each recording begins along F, and F
+    stamps_ns: NDArray[np.int64]  # (F,) int64
+    position_m: NDArray[np.float64]  # (F, 2) forward and left in the grid orientation of the frame's own recording
+    cell_m: float  # edge of a cell
+    # For each recording (its F, H, W) flags of true actors, None where its log does not hold the truth. They stay on
+    # the host: scores are split by them, and nothing is predicted from them.
     actors: tuple[NDArray[np.uint8] | None, ...] = ()
 
     def to(self, device: torch.device) -> "GridData":
@@ -143,3 +128,36 @@ def _check_recording(entry: "GridRecording", sensors: tuple[str, ...], size: tup
             raise InputError(f"the grids of {entry.name} have no sensor {name!r}, only {', '.join(entry.sensors)}")
     if entry.grids.shape[-2:] != size:
         raise InputError(f"the grids of {entry.name} are {entry.grids.shape[-2:]}, and the first ones are {size}")
+
+
+def shift_in_cells(moved_m: NDArray[np.float64], cell_m: float) -> NDArray[np.int64]:
+    """Round the way of the ego vehicle (..., 2: forward, left) to the cells (rows, columns) that content moves by.
+
+    Driving forward brings content nearer (down the rows); driving left moves it right (up the columns).
+    """
+    return np.rint(moved_m / cell_m).astype(np.int64)
+
+
+def shift_grids(grids: Tensor, shift_cells: Tensor) -> Tensor:
+    """Move content by whole cells (T2): (..., H, W) by (..., 2) rows and columns -> (..., H, W).
+
+    What leaves the grid is lost, and cells that enter it are unknown.
+    """
+    rows, columns = grids.shape[-2:]
+    source_row = torch.arange(rows, device=grids.device) - shift_cells[..., 0:1]  # (..., H)
+    source_column = torch.arange(columns, device=grids.device) - shift_cells[..., 1:2]  # (..., W)
+    inside = ((source_row >= 0) & (source_row < rows))[..., :, None] & (
+        (source_column >= 0) & (source_column < columns)
+    )[..., None, :]
+    source = source_row.clamp(0, rows - 1)[..., :, None] * columns + source_column.clamp(0, columns - 1)[..., None, :]
+    flat = grids.flatten(-2)
+    moved = flat.gather(-1, source.flatten(-2).expand(flat.shape)).reshape(grids.shape)
+    return torch.where(inside, moved, UNKNOWN)
+
+
+def covered_without_truth(aligned: Tensor, target: Tensor) -> Tensor:
+    """Compute the mask M: aligned (B, S, T, H, W) and target (B, H, W) -> (B, H, W) bool.
+
+    The paper's M = M_covered - M_target; the target's own cells of M_covered cancel out.
+    """
+    return (aligned != UNKNOWN).flatten(1, 2).any(dim=1) & (target == UNKNOWN)

@@ -11,14 +11,13 @@ from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.network import Network
-from semgrid_eval.models.own import ENTRY_POINT_GROUP
-from semgrid_eval.models.registry import find_model, is_named, version_of
-from semgrid_eval.windows.data import select_windows
+from semgrid_eval.models.registry import ENTRY_POINT_GROUP, find_model, is_named, version_of
+from semgrid_eval.windows.data import Window, select_windows
 from semgrid_eval.windows.grids import stack_recordings
-from semgrid_eval.windows.plan import Window
 
 OWN_MODELS = """
 import torch
+from pydantic import field_validator
 from semgrid_eval.config import Config
 from semgrid_eval.models.model import Model, one_hot
 from semgrid_eval.models.network import Network, input_planes
@@ -54,6 +53,15 @@ class Silent(Model):
     @classmethod
     def check(cls, settings, given):
         settings.unheard_of
+
+class Looking(Model):
+    class Settings(Config):
+        table: str = "small"
+
+        @field_validator("table")
+        @classmethod
+        def _known(cls, table):
+            return {"small": table}[table]
 
 class Untyped(Model):
     class Settings:
@@ -132,6 +140,13 @@ def test_installed_entry_point_is_a_model(monkeypatch, batch):
 def test_what_is_no_model_is_named(own, name, message):
     with pytest.raises(InputError, match=message):
         find_model(f"{own}:{name}")
+
+
+def test_validator_that_raises_is_named(own):
+    looking = find_model(f"{own}:Looking")
+    assert looking.parse_settings({}).table == "small"
+    with pytest.raises(InputError, match=r"own_models\.py:Looking: raised KeyError: 'large'$"):
+        looking.parse_settings({"table": "large"})
 
 
 def test_model_that_cannot_be_made_or_fitted_is_named(own, batch):

@@ -19,8 +19,7 @@ from semgrid_eval.log.codec import stamp_ns
 from semgrid_eval.log.store import LogReader, write_log
 from semgrid_eval.playback.write import GAP_NS, write_playback
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.runner import run_matrix
-from semgrid_eval.runs.units import RunOptions
+from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores import results
 
 YAW_RATE_RADPS = 0.3

@@ -7,7 +7,7 @@ import yaml
 
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
-from semgrid_eval.models.own import ENTRY_POINT_GROUP
+from semgrid_eval.models.registry import ENTRY_POINT_GROUP
 from semgrid_eval.runs.matrix import load_matrix, preset_names
 
 SCALED = ("paper-cpu", "architecture-cpu", "sensitivity")
@@ -301,6 +301,7 @@ def test_settings_of_what_is_no_model_are_an_error(tmp_path):
 
 
 OWN = """
+from pydantic import field_validator
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.network import Network, NetworkSettings
 
@@ -309,6 +310,11 @@ class Own(Network):
 
     class Settings(NetworkSettings):
         width: int = 3
+
+        @field_validator("width")
+        @classmethod
+        def _looked_up(cls, width):
+            return {3: 3, 4: 4, 8: 8, 999: 999}[width]
 
     @classmethod
     def check(cls, settings, given):
@@ -326,7 +332,12 @@ def test_settings_of_ones_own_network_are_axes_and_checked_where_its_code_can_be
     assert rows[0].settings["training"]["batch"] == 32
     assert rows[0].label.startswith("w4 (an own network, moved to the target's time")
     assert (rows[0].facts.family, rows[0].facts.learns, rows[0].facts.baseline) == ("Own", True, False)
-    for settings, message in (({"widht": 4}, r"settings\.widht: unknown key"), ({"width": 999}, "width: is too wide")):
+    faults = (
+        ({"widht": 4}, r"settings\.widht: unknown key"),
+        ({"width": 999}, "width: is too wide"),
+        ({"width": 5}, r"own\.py:Own: raised KeyError: 5$"),
+    )
+    for settings, message in faults:
         with pytest.raises(ConfigError, match=rf"m\.yaml: row 'a': .*{message}"):
             load(tmp_path, {"rows": [{"name": "a", "model": model, "settings": settings}]})
     (tmp_path / "own.py").write_text("def half(")

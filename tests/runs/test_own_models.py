@@ -7,7 +7,7 @@ import torch
 from support.small_runs import run, write_logs
 
 from semgrid_eval.executors import Processes
-from semgrid_eval.models.own import ENTRY_POINT_GROUP
+from semgrid_eval.models.registry import ENTRY_POINT_GROUP
 from semgrid_eval.runs import worker
 from semgrid_eval.scores import results
 from semgrid_eval.scores.metrics.iou import category_iou, class_iou

@@ -16,8 +16,7 @@ from semgrid_eval.files import locked
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs import plan
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.runner import run_matrix
-from semgrid_eval.runs.units import RunOptions
+from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores import results
 
 TINY = {"ed": {"features": 4, "depth": 2, "training": {"epochs": 1, "updates_per_epoch": 2, "batch": 2}}}

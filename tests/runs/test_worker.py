@@ -7,9 +7,8 @@ from semgrid_eval.log.store import write_log
 from semgrid_eval.progress import silent_stage
 from semgrid_eval.runs.matrix import Matrix
 from semgrid_eval.runs.row import Row
-from semgrid_eval.runs.runner import make_worker
-from semgrid_eval.runs.units import RunOptions
-from semgrid_eval.windows.plan import WindowConfig
+from semgrid_eval.runs.runner import RunOptions, make_worker
+from semgrid_eval.windows.data import WindowConfig
 
 SHORT = WindowConfig(step_frames=2, target_frame=8)
 ROWS = [

@@ -3,8 +3,8 @@ from itertools import chain
 import numpy as np
 import pytest
 
+from semgrid_eval.sensors.kinds import TOLERANCE_NS, synchronise
 from semgrid_eval.sensors.sensor import Points, SensorConfig
-from semgrid_eval.sensors.synchronise import TOLERANCE_NS, synchronise
 
 MS = 1_000_000
 
@@ -17,7 +17,7 @@ def together(*observations, max_age_s=0.1):
     sensors = {name: SensorConfig(kind="any", max_age_s=max_age_s) for name in ("a", "b", "c")}
     merged = sorted(chain(*observations), key=lambda points: points.stamp_ns)
     snapshots = synchronise(merged, sensors, "a")
-    return [(s.stamp_ns // MS, {name: points.stamp_ns / MS for name, points in s.points.items()}) for s in snapshots]
+    return [(stamp_ns // MS, {name: each.stamp_ns / MS for name, each in seen.items()}) for stamp_ns, seen in snapshots]
 
 
 def test_the_newest_observation_at_or_before_the_leaders_time_counts():

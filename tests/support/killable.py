@@ -5,8 +5,7 @@ from pathlib import Path
 import torch
 
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.runner import run_matrix
-from semgrid_eval.runs.units import RunOptions
+from semgrid_eval.runs.runner import RunOptions, run_matrix
 
 
 def run_here(matrix: str, logs: str, out: str) -> None:

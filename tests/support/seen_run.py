@@ -7,8 +7,7 @@ from support.toy_world import street
 
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.runner import run_matrix
-from semgrid_eval.runs.units import RunOptions
+from semgrid_eval.runs.runner import RunOptions, run_matrix
 
 SPLIT = ["split2_upper", "split2_lower"]
 STEP_FRAMES, TARGET_FRAME = 2, 8

@@ -6,8 +6,7 @@ from support.toy_world import street
 from semgrid_eval.executors import InProcess
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.runner import run_matrix
-from semgrid_eval.runs.units import RunOptions
+from semgrid_eval.runs.runner import RunOptions, run_matrix
 
 WINDOW = {"step_frames": 3, "target_frame": 8}
 SPLITS = ("train", "train", "val", "val")
