@@ -14,6 +14,11 @@ from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose
 
 T = TypeVar("T")
+_DECODERS: dict[str, Callable[[bytes], Any]] = {
+    topics.EGO_MOTION: codec.read_motion,
+    **dict.fromkeys((topics.EGO_POSE, topics.TRUE_POSE), codec.read_pose),
+    topics.TRUE_ACTORS: codec.read_actors,
+}
 
 
 class Picture(NamedTuple):
@@ -115,9 +120,21 @@ class LogReader(Container):
         return self._values(topics.TRUE_ACTORS, codec.read_actors)
 
     def moments(self) -> Iterator[Moment]:
-        """Iterate over all that the log holds, moment by moment, in the order of time."""
-        cameras = self.scene.cameras
-        return gather_moments(self._decoded(moment_decoders(cameras)), cameras)
+        """Iterate over all that the log holds, in the order of time.
+
+        A moment is all that has one stamp; motion belongs to the moment that comes next.
+        """
+        shown = picture_topics(self.scene.cameras, topics.PICTURE_FIELDS)
+        decoders = {**_DECODERS, **dict.fromkeys(shown, codec.read_image)}
+        waiting: list[MotionSample] = []
+        messages = _apart_from_motion(self._decoded(decoders), waiting)
+        for stamp_ns, of_one_time in groupby(messages, key=lambda message: message.stamp_ns):
+            motion = tuple(waiting)
+            waiting.clear()
+            found = {topic: value for topic, _, value in of_one_time}
+            pictures = [Picture(stamp_ns, *shown[topic], value) for topic, value in found.items() if topic in shown]
+            _, actors = found.get(topics.TRUE_ACTORS, (stamp_ns, None))
+            yield Moment(stamp_ns, dict(camera_frames(pictures)), motion, found.get(topics.TRUE_POSE), actors)
 
     def pictures(self, cameras: Iterable[str], channels: Iterable[str]) -> Iterator[Picture]:
         """Iterate over the pictures of some channels of some cameras in the order of time."""
@@ -155,33 +172,6 @@ class LogReader(Container):
 def picture_topics(cameras: Iterable[str], channels: Iterable[str]) -> dict[str, tuple[str, str]]:
     """Return camera and channel by topic."""
     return {camera_topic(camera, channel): (camera, channel) for camera, channel in product(cameras, channels)}
-
-
-def moment_decoders(cameras: Iterable[str]) -> dict[str, Callable[[bytes], Any]]:
-    """Return what decodes the messages that `gather_moments` needs, by topic."""
-    return {
-        topics.EGO_MOTION: codec.read_motion,
-        topics.EGO_POSE: codec.read_pose,
-        topics.TRUE_POSE: codec.read_pose,
-        topics.TRUE_ACTORS: codec.read_actors,
-        **dict.fromkeys(picture_topics(cameras, topics.PICTURE_FIELDS), codec.read_image),
-    }
-
-
-def gather_moments(messages: Iterable[Decoded], cameras: Iterable[str]) -> Iterator[Moment]:
-    """Gather the messages of `moment_decoders`, in the order of a log, into moments.
-
-    A moment is all that has one stamp; motion belongs to the moment that comes next.
-    """
-    shown = picture_topics(cameras, topics.PICTURE_FIELDS)
-    waiting: list[MotionSample] = []
-    for stamp_ns, of_one_time in groupby(_apart_from_motion(messages, waiting), key=lambda message: message.stamp_ns):
-        motion = tuple(waiting)
-        waiting.clear()
-        found = {topic: value for topic, _, value in of_one_time}
-        pictures = [Picture(stamp_ns, *shown[topic], value) for topic, value in found.items() if topic in shown]
-        _, actors = found.get(topics.TRUE_ACTORS, (stamp_ns, None))
-        yield Moment(stamp_ns, dict(camera_frames(pictures)), motion, found.get(topics.TRUE_POSE), actors)
 
 
 def _apart_from_motion(messages: Iterable[Decoded], motion: list[MotionSample]) -> Iterator[Decoded]:

@@ -188,12 +188,10 @@ class SegmentationNetwork:
         if (isinstance(shape[0], int) and shape[0] != 1) or 0 in shape:
             raise self._error(f"has shape {_shown(shape)}; one answer for one image is needed", self._output)
         classes = shape[1 if self._config.layout == "nchw" else 3] if kind == "float" else None
-        if isinstance(classes, int) and not self._fits(classes):
+        fewest = 2 if self._config.label_ids else self._classes
+        if isinstance(classes, int) and not fewest <= classes <= self._classes:
             wanted = f"at most {self._classes} label ids" if self._config.label_ids else f"{self._classes} train ids"
             raise self._error(f"scores {classes} classes; {wanted} are needed", self._output)
-
-    def _fits(self, classes: int) -> bool:
-        return 2 <= classes <= self._classes if self._config.label_ids else classes == self._classes
 
     def _error(self, message: str, tensor: _Tensor) -> InputError:
         return InputError(message, path=self._path, field=tensor.name)

@@ -36,10 +36,6 @@ def convert_town(
     """Simulate towns, draw recordings from them and write their logs; what is there already is kept.
 
     Towns are kept in the cache of `work`; the logs carry the name `dataset`.
-
-    Raises:
-        InputError: SUMO failed, or a folder cannot be written to.
-        MissingExtraError: SUMO or Embree is not installed.
     """
     with work.stage("simulate") as progress:
         cache = work.cache or out / CACHE
@@ -73,12 +69,7 @@ class SizeOptions(Config):
 
 
 def convert_town_v1(options: SizeOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
-    """Write the logs of town-v1 and, if none failed, compare them with the published ones.
-
-    Raises:
-        InputError: SUMO failed, a folder cannot be written to, or a log cannot be read again.
-        MissingExtraError: SUMO or Embree is not installed.
-    """
+    """Write the logs of town-v1 and, if none failed, compare them with the published ones."""
     benchmark, size = load_benchmark("town-v1"), options.size
     summary = convert_town(config_of(benchmark, size), out, work, dataset=benchmark.dataset(size))
     summary.all_splits = True

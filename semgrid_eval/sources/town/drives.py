@@ -134,8 +134,7 @@ def ego_path(traffic: Traffic, chosen: Drive) -> Trajectory | None:
 def choose_drives(traffic: Traffic, count: int, rng: np.random.Generator) -> list[Drive]:
     """Choose windows: a third standing or crawling, the rest by speeds drawn around 7 m/s; no two overlap in one car.
 
-    Raises:
-        InputError: the town's traffic does not hold so many windows.
+    Traffic that does not hold so many is an InputError.
     """
     actors, steps, speeds = _candidates(traffic)
     free = np.ones(len(actors), bool)

@@ -114,12 +114,7 @@ class RecordingPlan:
 
 
 def render_recording(plan: RecordingPlan) -> Recording:
-    """Return the recording of a plan; frames are rendered one by one as they are asked for.
-
-    Raises:
-        InputError: the town's folder is gone or damaged.
-        MissingExtraError: Embree is not installed.
-    """
+    """Return the recording of a plan; frames are rendered one by one as they are asked for."""
     calibration = cityscapes_camera(plan.width_px, plan.height_px)
     description = json.dumps(plan.description(), indent=2, sort_keys=True) + "\n"
     return Recording(

@@ -91,11 +91,7 @@ class RayCaster:
     """Triangles that rays can be cast at."""
 
     def __init__(self, triangles_m: Float32s) -> None:
-        """Build Embree's tree over triangles (F, 3, 3).
-
-        Raises:
-            MissingExtraError: Embree is not installed.
-        """
+        """Build Embree's tree over triangles (F, 3, 3)."""
         try:
             from embreex.mesh_construction import TriangleMesh
             from embreex.rtcore_scene import EmbreeScene

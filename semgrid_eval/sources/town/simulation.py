@@ -16,11 +16,7 @@ from semgrid_eval.sources.town.traffic import ROAD_USERS, Traffic, type_index
 
 
 def sumo_home() -> Path:
-    """Return the folder of the installed SUMO package.
-
-    Raises:
-        MissingExtraError: it is not installed.
-    """
+    """Return the folder of the installed SUMO package."""
     try:
         import sumo
     except ImportError:
@@ -29,17 +25,12 @@ def sumo_home() -> Path:
 
 
 def run_binary(name: str, options: list[str], folder: Path) -> None:
-    """Run one of SUMO's binaries (`netgenerate`, `netconvert`, `sumo`) inside `folder`.
-
-    Raises:
-        InputError: it failed; the message is SUMO's own.
-        MissingExtraError: SUMO is not installed.
-    """
+    """Run one of SUMO's binaries (`netgenerate`, `netconvert`, `sumo`) inside `folder`; failures speak in its words."""
     _run(name, [str(sumo_home() / "bin" / name), *options], folder)
 
 
 def run_tool(name: str, options: list[str], folder: Path) -> None:
-    """Run one of SUMO's Python tools (`randomTrips`) inside `folder`; raises what `run_binary` raises."""
+    """Run one of SUMO's Python tools (`randomTrips`) inside `folder`, likewise."""
     _run(name, [sys.executable, str(sumo_home() / "tools" / f"{name}.py"), *options], folder)
 
 
@@ -89,11 +80,7 @@ _STREAMS = (
 
 
 def write_demand(network: Path, kind: TownKind, street_km: float, end_s: float, rng: np.random.Generator) -> list[str]:
-    """Write types and trips of everybody beside the network and return the names of the files of trips.
-
-    Raises:
-        InputError: SUMO's tool failed.
-    """
+    """Write types and trips of everybody beside the network and return the names of the files of trips."""
     _write_types(network.parent / TYPES_FILE)
     density = {"passenger": kind.cars, "truck": kind.trucks, "bus": kind.buses}
     density |= {"bicycle": kind.bicycles, "pedestrian": kind.persons}
@@ -150,9 +137,6 @@ def simulate_traffic(
     """Fill the streets, let the traffic settle, and record `duration_s` of it at 17 Hz.
 
     SUMO's files are put beside the file of the network, whose streets have a length of `street_km`.
-
-    Raises:
-        InputError: a tool of SUMO failed, or nobody moved.
     """
     folder = network.parent
     routes = write_demand(network, kind, street_km, WARM_UP_S + duration_s, rng)

@@ -11,18 +11,8 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
 
-
-class Texture(IntEnum):
-    """How a surface is shaded."""
-
-    PLAIN = 0
-    FACADE = 1
-    ROOF = 2
-    FOLIAGE = 3
-    GLASS = 4
-    PLANKS = 5
-
-
+Texture = IntEnum("Texture", "PLAIN FACADE ROOF FOLIAGE GLASS PLANKS", start=0)
+"""How a surface is shaded."""
 _MEASURES = ("x_m", "y_m", "yaw_rad", "bottom_m", "top_m", "length_m", "width_m")
 _OF_TOP = ("top_length_m", "top_width_m", "top_shift_m")
 _LOOKS = [("label", "u1"), ("texture", "u1"), ("instance", "u2"), ("colour", "u1", (3,))]
@@ -54,13 +44,8 @@ def box(
 ) -> BoxRow:
     """Return a row of `BOX`.
 
-    Args:
-        place: x, y of the base's centre and yaw.
-        heights_m: bottom and top.
-        size_m: length and width of the base.
-        look: Cityscapes label id, texture and sRGB colour.
-        top_size_m: length and width of the top where they differ.
-        instance: actor id, 0 where there is none.
+    The place is x, y of the base's centre and yaw; heights are bottom and top, sizes length and width of the base and,
+    where they differ, of the top; the instance is an actor's id, 0 where there is none.
     """
     label, texture, colour = look
     return (*place, *heights_m, *size_m, *(top_size_m or size_m), 0.0, label, texture, instance, colour)

@@ -33,11 +33,7 @@ class _Street:
 
 
 def lay_out_streets(kind: TownKind, size_m: float, rng: np.random.Generator, folder: Path) -> Path:
-    """Write a SUMO network of about `size_m` x `size_m` into `folder` and return its path.
-
-    Raises:
-        InputError: a tool of SUMO failed.
-    """
+    """Write a SUMO network of about `size_m` x `size_m` into `folder` and return its path."""
     count = max(3, round(size_m / kind.block_m) + 1)
     spacing_m = size_m / (count - 1)
     seed = str(int(rng.integers(1 << 30)))

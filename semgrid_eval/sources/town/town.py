@@ -86,11 +86,7 @@ class TownSpec:
     duration_s: float  # recorded time
 
     def digest(self) -> str:
-        """Digest the specification and the versions of what builds the town.
-
-        Raises:
-            MissingExtraError: SUMO is not installed.
-        """
+        """Digest the specification and the versions of what builds the town."""
         try:
             sumo = importlib.metadata.version("eclipse-sumo")
         except importlib.metadata.PackageNotFoundError:
@@ -107,12 +103,7 @@ class Town:
 
 
 def prepare_town(spec: TownSpec, cache: Path) -> Path:
-    """Build a town, unless the cache holds it already, and return its folder.
-
-    Raises:
-        InputError: SUMO failed, or the cache cannot be written to.
-        MissingExtraError: SUMO is not installed.
-    """
+    """Build a town, unless the cache holds it already, and return its folder."""
     folder = cache / f"town-{spec.digest()}"
     if not _is_complete(folder, spec):
         with atomic_folder(folder) as partial:
@@ -122,11 +113,7 @@ def prepare_town(spec: TownSpec, cache: Path) -> Path:
 
 
 def load_town(folder: Path) -> Town:
-    """Map a town's arrays from disk.
-
-    Raises:
-        InputError: the folder holds no complete town.
-    """
+    """Map a town's arrays from disk, from a folder that must hold a complete town."""
     try:
         return Town(Scene.load(folder / "scene"), Traffic.load(folder / "traffic"))
     except (OSError, ValueError, KeyError) as error:

@@ -10,16 +10,8 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
 
-
-class Shape(IntEnum):
-    """How a road user looks; each has a model of its own."""
-
-    CAR = 0
-    VAN = 1
-    TRUCK = 2
-    BUS = 3
-    BICYCLE = 4
-    PERSON = 5
+Shape = IntEnum("Shape", "CAR VAN TRUCK BUS BICYCLE PERSON", start=0)
+"""How a road user looks; each has a model of its own."""
 
 
 @dataclass(frozen=True)
