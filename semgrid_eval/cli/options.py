@@ -15,6 +15,8 @@ from semgrid_eval.ray_executor import LOCAL, RayExecutor
 FOLDER = click.Path(path_type=Path, file_okay=False)
 THERE = click.Path(path_type=Path, exists=True)
 WORKERS = click.IntRange(1, 256)
+Command = TypeVar("Command", bound=Callable[..., Any])
+device_option = click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 
 
 def parameters_of(config: type[Config]) -> Iterator[click.Parameter]:
@@ -58,15 +60,9 @@ def _plain(annotation: Any) -> Any:  # noqa: ANN401 - a type annotation
     return _plain(choices[0]) if NoneType in get_args(annotation) and len(choices) == 1 else annotation
 
 
-Command = TypeVar("Command", bound=Callable[..., Any])
-
-
 def workers_option(text: str) -> Callable[[Command], Command]:
     """Return the option --workers, which is all cores unless given."""
     return click.option("--workers", type=WORKERS, default=available_cores(), show_default="all cores", help=text)
-
-
-device_option = click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 
 
 def executor_options(command: Command) -> Command:

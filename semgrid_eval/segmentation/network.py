@@ -17,6 +17,10 @@ from semgrid_eval.segmentation.config import SegmentationConfig
 
 Size = tuple[int, int]
 """Width and height in pixels."""
+_VOID = 255
+_MESSAGE_CHARACTERS = 200
+Shape = Sequence[int | str | None]
+"""Of a tensor; axes that the model leaves open have a name, or None."""
 
 
 def network_input(
@@ -65,12 +69,6 @@ def size_of(picture: NDArray[np.generic]) -> Size:
 def _plane(scores: NDArray[np.floating], size: Size, *, smooth: bool) -> NDArray[np.float32]:
     plane = np.array(scores, np.float32, order="C")
     return np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR)) if smooth else plane
-
-
-_VOID = 255
-_MESSAGE_CHARACTERS = 200
-Shape = Sequence[int | str | None]
-"""Of a tensor; axes that the model leaves open have a name, or None."""
 
 
 class _Tensor(NamedTuple):

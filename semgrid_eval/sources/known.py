@@ -1,4 +1,4 @@
-"""The sources that the command line offers, one line each."""
+"""What every source offers, and the sources that the command line offers, one line each."""
 
 import importlib
 from collections.abc import Callable

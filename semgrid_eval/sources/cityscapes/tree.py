@@ -40,6 +40,17 @@ _IMAGES = "leftImg8bit_sequence"
 _CAMERA_NAME = re.compile(r"[A-Za-z0-9_-]+")
 _IMAGE_NAME = re.compile(r"(?P<sequence>.+_[0-9]+)_(?P<number>[0-9]+)_leftImg8bit\.png")
 _LABELS = "Folder of label images whose names begin with the frame's, anywhere below it; else gtFine is used."
+_HELP = """Convert the Cityscapes sequence tree SRC to logs OUT/<split>/<city>_<sequence>_<first frame>.mcap.
+
+SRC holds leftImg8bit_sequence, disparity_sequence, vehicle_sequence, timestamp_sequence and camera (for each frame
+or one of a sequence). Where frame numbers break off inside a stretch of 30 a frame is lost, elsewhere another log
+begins.
+
+A recording fails as a whole, named with the file at fault, if a frame is lost, a file is missing, broken or
+impossible, camera files differ, time stamps do not grow, or a picture has another size or bit depth: windows count
+frames, so none may be dropped. Frames without a label image are allowed. The other recordings are converted; the
+exit code is then 1. Logs whose inputs have not changed are left as they are.
+"""
 
 
 class CityscapesOptions(Config):
@@ -179,19 +190,6 @@ class _LabelFiles:
             if path.stem.lower().endswith(self._other):
                 raise InputError(f"is named as {self._advice}", path=path)
         return exact or found
-
-
-_HELP = """Convert the Cityscapes sequence tree SRC to logs OUT/<split>/<city>_<sequence>_<first frame>.mcap.
-
-SRC holds leftImg8bit_sequence, disparity_sequence, vehicle_sequence, timestamp_sequence and camera (for each frame
-or one of a sequence). Where frame numbers break off inside a stretch of 30 a frame is lost, elsewhere another log
-begins.
-
-A recording fails as a whole, named with the file at fault, if a frame is lost, a file is missing, broken or
-impossible, camera files differ, time stamps do not grow, or a picture has another size or bit depth: windows count
-frames, so none may be dropped. Frames without a label image are allowed. The other recordings are converted; the
-exit code is then 1. Logs whose inputs have not changed are left as they are.
-"""
 
 
 def convert_cityscapes(options: CityscapesOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:

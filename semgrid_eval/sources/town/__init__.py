@@ -1,5 +1,5 @@
 """The simulated town: traffic by SUMO, pictures by ray casting.
 
-What fails, SUMO itself or the folder of towns, is an InputError; where SUMO or Embree is not installed, what needs it is
-a MissingExtraError.
+Where SUMO or Embree is not installed, what needs it raises a MissingExtraError; where SUMO fails or the folder of towns
+cannot be used, an InputError.
 """

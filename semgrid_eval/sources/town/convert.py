@@ -1,4 +1,4 @@
-"""The simulated town as logs."""
+"""The simulated town as logs: any, or a frozen data set, which is compared with what is published."""
 
 import platform
 from collections.abc import Mapping
@@ -28,6 +28,13 @@ Traffic comes from Eclipse SUMO, pictures from ray casting with Embree; exact la
 and all road users with their velocities are on topics of their own. Training and validation have different towns.
 Logs that are up to date are left as they are, so that the same command goes on after a stop.
 """
+_PACKAGES = ("numpy", "opencv-python-headless", "eclipse-sumo", "embreex")
+_TOWN_V1_HELP = """Make the frozen data set town-v1 of the simulated town, which is the same everywhere.
+
+It has 300 recordings for training and 120 for validation, or 2,975 and 500 with --size full. The last line says whether
+every recording is the published one. Logs that are up to date are left as they are, so that the same command goes on
+after a stop.
+"""
 
 
 def convert_town(
@@ -51,15 +58,6 @@ SOURCE = Source(
     example="semgrid-eval convert synthetic logs --recordings 2 --towns 2 --town-size-m 250 --duration-s 15",
     cache=KEPT,
 )
-
-
-_PACKAGES = ("numpy", "opencv-python-headless", "eclipse-sumo", "embreex")
-_SIZED_HELP = """Make the frozen data set town-v1 of the simulated town, which is the same everywhere.
-
-It has 300 recordings for training and 120 for validation, or 2,975 and 500 with --size full. The last line says whether
-every recording is the published one. Logs that are up to date are left as they are, so that the same command goes on
-after a stop.
-"""
 
 
 class SizeOptions(Config):
@@ -131,7 +129,7 @@ def _verdict(name: str, comparison: Comparison | None, total: int, made_with: Ma
 TOWN_V1 = Source(
     options=SizeOptions,
     convert=convert_town_v1,
-    help=_SIZED_HELP,
+    help=_TOWN_V1_HELP,
     example="semgrid-eval convert town-v1 logs --size small",
     cache=KEPT,
 )

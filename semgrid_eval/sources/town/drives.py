@@ -1,4 +1,4 @@
-"""Chooses which simulated car is the ego vehicle, and when, so that speeds are mixed as in recorded traffic."""
+"""Which simulated car is the ego vehicle and when, how it moves, and what it reports of its motion."""
 
 import math
 from dataclasses import dataclass
@@ -14,6 +14,19 @@ FRONT_TO_REAR_AXLE_M = 3.8
 SMOOTHING_S = 0.25
 MAX_YAW_RATE_RADPS = 0.6
 _MAX_STEP_M = 1.2  # 20 m/s at 17 Hz; what goes farther was moved by SUMO, not driven
+FRAME_COUNT = 30
+FRAME_RATE_HZ = 17.0
+STANDING_SHARE = 1.0 / 3.0
+STANDING_BELOW_MPS = 2.0
+CRUISE_MPS = (7.0, 2.6)  # mean and standard deviation of the drawn speeds of the rest
+CRUISE_LIMITS_MPS = (2.0, 13.0)
+_LEAD_STEPS = 40  # before a window, for the rear axle to find its track
+_WINDOW_STEPS = 33
+_TAIL_STEPS = 14  # after a window, for smoothing
+_STRIDE_STEPS = 5
+_APART_STEPS = 60  # between two windows of one car
+_CANDIDATES = 48
+_EGO_BOX_M = (-1.0, 4.3, 0.9)  # from, to, half width: nobody may be inside
 
 
 @dataclass(frozen=True)
@@ -29,10 +42,8 @@ class Trajectory:
     def at(self, time_s: float) -> tuple[float, float, float, float, float]:
         """Interpolate x, y, yaw, speed and yaw rate."""
         columns = (*self.position_m.T, self.yaw_rad, self.speed_mps, self.yaw_rate_radps)
-        x_m, y_m, yaw_rad, speed_mps, yaw_rate_radps = (
-            float(np.interp(time_s, self.times_s, column)) for column in columns
-        )
-        return x_m, y_m, yaw_rad, speed_mps, yaw_rate_radps
+        x_m, y_m, yaw_rad, speed, yaw_rate = (float(np.interp(time_s, self.times_s, column)) for column in columns)
+        return x_m, y_m, yaw_rad, speed, yaw_rate
 
 
 @dataclass(frozen=True)
@@ -98,21 +109,6 @@ def _smoothed(points: Floats, sigma: float) -> Floats:
     kernel /= kernel.sum()
     padded = np.pad(points, ((reach, reach), (0, 0)), "reflect", reflect_type="odd")
     return np.stack([np.convolve(column, kernel, "valid") for column in padded.T], axis=1)
-
-
-FRAME_COUNT = 30
-FRAME_RATE_HZ = 17.0
-STANDING_SHARE = 1.0 / 3.0
-STANDING_BELOW_MPS = 2.0
-CRUISE_MPS = (7.0, 2.6)  # mean and standard deviation of the drawn speeds of the rest
-CRUISE_LIMITS_MPS = (2.0, 13.0)
-_LEAD_STEPS = 40  # before a window, for the rear axle to find its track
-_WINDOW_STEPS = 33
-_TAIL_STEPS = 14  # after a window, for smoothing
-_STRIDE_STEPS = 5
-_APART_STEPS = 60  # between two windows of one car
-_CANDIDATES = 48
-_EGO_BOX_M = (-1.0, 4.3, 0.9)  # from, to, half width: nobody may be inside
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Renders one recording frame by frame: what the cameras see, what the vehicle reports, and the truth."""
+"""Renders one recording frame by frame: who is on stage, what the cameras see, what the vehicle reports, the truth."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -12,16 +12,8 @@ from numpy.typing import NDArray
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.recording.types import Actor, Moment, MotionSample, Pose, Recording
+from semgrid_eval.sources.town import drives
 from semgrid_eval.sources.town.bodies import actor_ids, boxes_of, heights_m
-from semgrid_eval.sources.town.drives import (
-    EXACT_MOTION,
-    FRAME_COUNT,
-    FRAME_RATE_HZ,
-    Drive,
-    MotionNoise,
-    ego_path,
-    report,
-)
 from semgrid_eval.sources.town.rig import Rig
 from semgrid_eval.sources.town.sensors import Camera, RayCaster, View, cityscapes_camera, look
 from semgrid_eval.sources.town.shading import Painter, Sunlight, draw_sunlight
@@ -31,6 +23,10 @@ from semgrid_eval.sources.town.traffic import ROAD_USERS, Snapshot
 
 _SIGHT_M = 160.0
 _BEHIND_M, _ASIDE_M, _WIDENING = 9.0, 9.0, 0.55  # includes what throws shadows into the picture
+CAMERA_NAME = "front"
+RENDER_VERSION = 2
+"""Counts changes to what a plan renders to; logs of another version are rendered again."""
+STAMP_JITTER_S = 0.001
 
 
 class Stage:
@@ -80,12 +76,6 @@ def _in_sight(actors: Snapshot, pose: Pose) -> Snapshot:
     return actors.where((ahead_m > -_BEHIND_M) & (np.abs(left_m) < _ASIDE_M + _WIDENING * np.maximum(ahead_m, 0.0)))
 
 
-CAMERA_NAME = "front"
-RENDER_VERSION = 2
-"""Counts changes to what a plan renders to; logs of another version are rendered again."""
-STAMP_JITTER_S = 0.001
-
-
 @dataclass(frozen=True)
 class RecordingPlan:
     """Everything that determines a recording; small, and cheap to send to another process."""
@@ -94,7 +84,7 @@ class RecordingPlan:
     split: str  # `train` or `val`
     town: Path  # folder of the town
     town_digest: str  # of the town's specification
-    drive: Drive  # which car, from when
+    drive: drives.Drive  # which car, from when
     seed: tuple[int, ...]  # of the recording's random numbers
     width_px: int  # of the images
     height_px: int  # of the images
@@ -131,13 +121,13 @@ def render_recording(plan: RecordingPlan) -> Recording:
 
 def _moments(plan: RecordingPlan) -> Iterator[Moment]:
     town = load_town(plan.town)
-    path = ego_path(town.traffic, plan.drive)
+    path = drives.ego_path(town.traffic, plan.drive)
     assert path is not None, "a plan's drive was checked when it was chosen"
     stamps, reports, light, errors = np.random.default_rng(plan.seed).spawn(4)
-    times_s = plan.drive.start_s + np.arange(FRAME_COUNT) / FRAME_RATE_HZ
-    times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, FRAME_COUNT - 1))
-    motion_noise = EXACT_MOTION if plan.stereo == "exact" else MotionNoise()
-    reported = report(path, times_s, motion_noise, reports)
+    times_s = plan.drive.start_s + np.arange(drives.FRAME_COUNT) / drives.FRAME_RATE_HZ
+    times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, drives.FRAME_COUNT - 1))
+    motion_noise = drives.EXACT_MOTION if plan.stereo == "exact" else drives.MotionNoise()
+    reported = drives.report(path, times_s, motion_noise, reports)
     camera = Camera(cityscapes_camera(plan.width_px, plan.height_px), plan.width_px, plan.height_px)
     rig = Rig(camera, plan.stereo, errors)
     stage = Stage(town, rig.cameras, draw_sunlight(light), path.at(float(times_s[0]))[:2])
@@ -156,14 +146,13 @@ def _rounded(values: NDArray[np.float64]) -> Any:  # noqa: ANN401 - floats, in l
 
 
 def _actors(group: Snapshot) -> list[Actor]:
-    columns = np.column_stack(
-        [group.centre_m, group.yaw_rad, heights_m(group.actor, group.type_index), group.velocity_mps]
-    )
+    height_m = heights_m(group.actor, group.type_index)
+    columns = np.column_stack([group.centre_m, group.yaw_rad, height_m, group.velocity_mps])
     found = []
     ids = actor_ids(group).tolist()
     for actor_id, type_index, values in zip(ids, group.type_index, _rounded(columns), strict=True):
         user = ROAD_USERS[type_index]
-        x_m, y_m, yaw_rad, height_m, velocity_x, velocity_y = values
-        size_m = (user.length_m, user.width_m, height_m)
+        x_m, y_m, yaw_rad, high_m, velocity_x, velocity_y = values
+        size_m = (user.length_m, user.width_m, high_m)
         found.append(Actor(actor_id, user.label_id, x_m, y_m, yaw_rad, *size_m, velocity_x, velocity_y))
     return found

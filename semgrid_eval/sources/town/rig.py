@@ -17,6 +17,11 @@ NEAREST_M = 3.0
 _BLOCK_PX = 5
 _SUBPIXELS = 16
 _SENSOR_NOISE = 2.0  # standard deviation in grey levels; without it even a clear sky would match
+# Speed counts more than size here. OpenCV before 4.12 has no choice of filter and ignores it.
+_FILTER, _NO_FILTER, _FILTER_UP = 19, 8, 32
+_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY]
+_COLOUR_PNG = [*_PNG, 0, _FILTER, _NO_FILTER]
+_GREY_PNG = [*_PNG, cv2.IMWRITE_PNG_STRATEGY_RLE, _FILTER, _FILTER_UP]
 
 
 class StereoMatcher:
@@ -64,13 +69,6 @@ def right_of(camera: Camera) -> Camera:
     left = camera.calibration
     x_m, y_m, z_m = left.ego_from_optical.apply(np.array([left.baseline_m, 0.0, 0.0]))
     return replace(camera, calibration=replace(left, x_m=float(x_m), y_m=float(y_m), z_m=float(z_m)))
-
-
-# Speed counts more than size here. OpenCV before 4.12 has no choice of filter and ignores it.
-_FILTER, _NO_FILTER, _FILTER_UP = 19, 8, 32
-_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY]
-_COLOUR_PNG = [*_PNG, 0, _FILTER, _NO_FILTER]
-_GREY_PNG = [*_PNG, cv2.IMWRITE_PNG_STRATEGY_RLE, _FILTER, _FILTER_UP]
 
 
 class Rig:

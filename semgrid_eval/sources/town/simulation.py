@@ -1,4 +1,4 @@
-"""Simulates a town's traffic with SUMO and turns its trajectories into compact arrays."""
+"""Runs SUMO: its tools, who travels when, and the trajectories, which become compact arrays."""
 
 import os
 import subprocess
@@ -13,6 +13,15 @@ import pandas as pd
 from semgrid_eval.errors import InputError, MissingExtraError
 from semgrid_eval.sources.town.kinds import TownKind
 from semgrid_eval.sources.town.traffic import ROAD_USERS, Traffic, type_index
+
+FILL_S = 24.0
+"""Time in which the streets are filled; from then on as many depart as arrive."""
+TYPES_FILE = "types.add.xml"
+_FAR = ("--min-distance", "200")
+STEP_S = 0.059  # SUMO counts whole milliseconds; 1/17 s is 58.8 ms
+WARM_UP_S = 60.0
+_TRAJECTORIES = "fcd.csv"
+_FIELDS = ["timestep_time", "vehicle_id", "vehicle_x", "vehicle_y", "vehicle_angle", "vehicle_speed", "vehicle_type"]
 
 
 def sumo_home() -> Path:
@@ -51,12 +60,6 @@ def _fault(output: str) -> str:
     lines = [line.strip() for line in output.splitlines() if line.strip()]
     faults = [line.removeprefix("Error:").strip() for line in lines if line.startswith("Error:")]
     return "; ".join(faults[:3]) or (lines[-1] if lines else "no message")
-
-
-FILL_S = 24.0
-"""Time in which the streets are filled; from then on as many depart as arrive."""
-TYPES_FILE = "types.add.xml"
-_FAR = ("--min-distance", "200")
 
 
 class _Stream(NamedTuple):
@@ -123,12 +126,6 @@ def _write_trips(
         else:
             trip.attrib.update(departLane="best", departSpeed="max", departPos="random_free" if is_first else "base")
     tree.write(path)
-
-
-STEP_S = 0.059  # SUMO counts whole milliseconds; 1/17 s is 58.8 ms
-WARM_UP_S = 60.0
-_TRAJECTORIES = "fcd.csv"
-_FIELDS = ["timestep_time", "vehicle_id", "vehicle_x", "vehicle_y", "vehicle_angle", "vehicle_speed", "vehicle_type"]
 
 
 def simulate_traffic(

@@ -1,4 +1,4 @@
-"""The two solids that everything in the town is made of, tapered boxes and tree crowns, turned into triangles."""
+"""The solids that everything in the town is made of, tapered boxes, trees and bushes, turned into triangles."""
 
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
@@ -26,6 +26,9 @@ BoxRow = tuple[float | Colour, ...]
 # Corners: bit 0 front, bit 1 left, bit 2 top. Faces turn counter-clockwise seen from outside.
 _FACES = "023 031 457 476 015 054 267 273 137 175 046 062"
 _BOX_FACES = np.array([[int(corner) for corner in face] for face in _FACES.split()])
+_VEGETATION = LABEL_ID["vegetation"]
+_BARK = (88, 72, 58)
+_LEAVES = np.array([(70, 98, 48), (88, 112, 54), (58, 84, 46), (104, 116, 60), (76, 92, 58)], np.uint8)
 
 
 def colours(hexadecimal: str) -> list[Colour]:
@@ -152,11 +155,6 @@ def _icosphere() -> tuple[Floats, NDArray[np.int64]]:
 def _is_outward(points: Floats, face: tuple[int, int, int]) -> bool:
     first, second, third = points[list(face)]
     return bool(np.dot(np.cross(second - first, third - first), first) > 0.0)
-
-
-_VEGETATION = LABEL_ID["vegetation"]
-_BARK = (88, 72, 58)
-_LEAVES = np.array([(70, 98, 48), (88, 112, 54), (58, 84, 46), (104, 116, 60), (76, 92, 58)], np.uint8)
 
 
 @dataclass(frozen=True)

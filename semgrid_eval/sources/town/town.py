@@ -1,4 +1,4 @@
-"""A simulated town: streets and traffic from SUMO, a scene built along the streets, kept on disk by digest."""
+"""A simulated town: streets and traffic from SUMO, a still scene built along the streets, kept on disk by digest."""
 
 import importlib.metadata
 import tempfile
@@ -24,6 +24,9 @@ from semgrid_eval.sources.town.traffic import Snapshot, Traffic
 
 FIRST_PARKED_ID = 32768
 """Actor ids from here on are parked cars; SUMO's road users have lower ones."""
+TOWN_VERSION = 2
+"""Counts changes to how towns are built; a town of another version is built again."""
+_SPEC_FILE = "town.json"
 
 
 @dataclass(frozen=True)
@@ -68,11 +71,6 @@ def _standing(type_index: NDArray[np.uint8], centre_m: NDArray[np.float64], yaw_
     # Parked cars get actor indices of their own so that they do not copy the colours of moving ones.
     actor = (FIRST_PARKED_ID - 1 + np.arange(len(type_index))).astype(np.int32)
     return Snapshot(actor, type_index, centre_m, yaw_rad, np.zeros((len(type_index), 2)))
-
-
-TOWN_VERSION = 2
-"""Counts changes to how towns are built; a town of another version is built again."""
-_SPEC_FILE = "town.json"
 
 
 @dataclass(frozen=True)

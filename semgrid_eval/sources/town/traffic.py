@@ -1,4 +1,4 @@
-"""The traffic of a town over time: who is where at any moment, from arrays that can be mapped from disk."""
+"""The road users and their traffic over time: who is where at any moment, from arrays mapped from disk."""
 
 from dataclasses import dataclass, fields
 from enum import IntEnum
@@ -12,6 +12,8 @@ from semgrid_eval.geometry import Floats
 
 Shape = IntEnum("Shape", "CAR VAN TRUCK BUS BICYCLE PERSON", start=0)
 """How a road user looks; each has a model of its own."""
+_CAR, _TRUCK, _BUS = LABEL_ID["car"], LABEL_ID["truck"], LABEL_ID["bus"]
+_JUMP_M = 1.0  # nobody moves that far in one step of 59 ms; SUMO's pedestrians now and then do
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,6 @@ class RoadUser:
     share: float  # among the types of its SUMO class
 
 
-_CAR, _TRUCK, _BUS = LABEL_ID["car"], LABEL_ID["truck"], LABEL_ID["bus"]
 ROAD_USERS = (
     RoadUser("car_small", "passenger", Shape.CAR, _CAR, 3.9, 1.72, 1.48, 0.35),
     RoadUser("car_family", "passenger", Shape.CAR, _CAR, 4.6, 1.82, 1.46, 0.35),
@@ -48,7 +49,6 @@ def type_index(name: str) -> int:
     return [user.name for user in ROAD_USERS].index(name)
 
 
-_JUMP_M = 1.0  # nobody moves that far in one step of 59 ms; SUMO's pedestrians now and then do
 _LENGTHS_M = np.array([user.length_m for user in ROAD_USERS], np.float32)
 _IS_PERSON = np.array([user.shape is Shape.PERSON for user in ROAD_USERS])
 
