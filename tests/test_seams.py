@@ -28,7 +28,7 @@ from support.toy_world import street
 
 from semgrid_eval.config import Config
 from semgrid_eval.log.convert import convert_recordings
-from semgrid_eval.sources.source import Source
+from semgrid_eval.sources.known import Source
 
 
 class Options(Config):

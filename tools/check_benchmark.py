@@ -17,7 +17,7 @@ from semgrid_eval.log.fingerprint import fingerprint
 from semgrid_eval.log.store import write_log
 from semgrid_eval.progress import silent
 from semgrid_eval.sources.benchmarks import SIZES, SizeName, load_benchmark, short_fingerprints
-from semgrid_eval.sources.town.benchmark import changed_versions, config_of
+from semgrid_eval.sources.town.convert import changed_versions, config_of
 from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
 

@@ -25,7 +25,8 @@ from semgrid_eval.errors import SemgridError
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.recording import GridRecording
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.log.store import LogReader, find_logs
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import find_logs
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.recording.types import CameraFrame
 from semgrid_eval.sensors.camera import CameraSensor

@@ -17,7 +17,8 @@ from semgrid_eval.classes import class_palette, label_palette
 from semgrid_eval.files import atomic_file
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.log.store import LogReader, find_logs
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import find_logs
 from semgrid_eval.recording.png import decode_gray
 
 LOGS = 6

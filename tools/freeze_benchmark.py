@@ -12,7 +12,8 @@ from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.executors import available_cores, local_executor
 from semgrid_eval.files import write_json
 from semgrid_eval.log.fingerprint import fingerprints
-from semgrid_eval.log.store import LogReader, find_logs, label_of
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import find_logs, label_of
 from semgrid_eval.progress import silent
 from semgrid_eval.sources.benchmarks import (
     BENCHMARKS,
@@ -22,7 +23,7 @@ from semgrid_eval.sources.benchmarks import (
     load_benchmark,
     short_fingerprints,
 )
-from semgrid_eval.sources.town.benchmark import versions
+from semgrid_eval.sources.town.convert import versions
 
 
 def freeze(out: Path) -> str:

@@ -3,12 +3,14 @@
 import json
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from semgrid_eval.cli.console import progress, say
-from semgrid_eval.log.check import LogReport, check_log
-from semgrid_eval.log.store import find_logs
+
+if TYPE_CHECKING:
+    from semgrid_eval.log.check import LogReport
 
 
 @click.command("check", epilog="Example: semgrid-eval check logs")
@@ -21,6 +23,9 @@ def command(logs: tuple[Path, ...], *, as_json: bool) -> int:
     calibration and motion, and decodes every label and disparity image. One line a finding; the exit code is 1 if any
     is an error.
     """
+    from semgrid_eval.log.check import check_log
+    from semgrid_eval.log.store import find_logs
+
     paths = [path for given in logs for path in (find_logs(given) if given.is_dir() else [given])]
     reports: list[LogReport] = []
     with progress("check") as watch:
@@ -38,7 +43,7 @@ def command(logs: tuple[Path, ...], *, as_json: bool) -> int:
     return 1 if bad else 0
 
 
-def _as_json(report: LogReport) -> dict[str, object]:
+def _as_json(report: "LogReport") -> dict[str, object]:
     return {
         "log": str(report.path),
         "good": report.good,

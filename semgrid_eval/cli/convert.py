@@ -2,19 +2,18 @@
 
 from inspect import cleandoc
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from semgrid_eval.cli.console import progress, say
-from semgrid_eval.cli.options import parameters_of
-from semgrid_eval.cli.work import chosen_executor, executor_options, workers_option
+from semgrid_eval.cli.options import FOLDER, chosen_executor, executor_options, parameters_of, workers_option
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import InputError, MissingExtraError
-from semgrid_eval.log.convert import ConversionSummary, Work
-from semgrid_eval.log.store import find_logs, label_of
-from semgrid_eval.sources.known import SOURCES, load_source
-from semgrid_eval.sources.source import Source
+from semgrid_eval.sources.known import SOURCES, Source, load_source
+
+if TYPE_CHECKING:
+    from semgrid_eval.log.convert import ConversionSummary
 
 
 class _Sources(click.Group):
@@ -43,19 +42,19 @@ def command_of(name: str, source: Source[Any]) -> click.Command:
     @workers_option("Logs at once.")
     @executor_options
     def convert(out: Path, workers: int, executor: str, address: str, **given: Any) -> int:  # noqa: ANN401 - options
+        from semgrid_eval.log.convert import Work
+
         work = Work(workers, chosen_executor(executor, address, workers), given.pop("cache", None), progress)
         return show(source.convert(parse_config(source.options, given), out, work), out)
 
-    folder = click.Path(path_type=Path, file_okay=False)
-    parameters = [*parameters_of(source.options), click.Argument(["out"], type=folder)]
+    parameters = [*parameters_of(source.options), click.Argument(["out"], type=FOLDER)]
     if source.cache:
-        parameters.append(click.Option(["--cache"], type=folder, help=source.cache))
-    return click.command(name, params=parameters, help=cleandoc(source.help), epilog=f"Example: {source.example}")(
-        convert
-    )
+        parameters.append(click.Option(["--cache"], type=FOLDER, help=source.cache))
+    made = click.command(name, params=parameters, help=cleandoc(source.help), epilog=f"Example: {source.example}")
+    return made(convert)
 
 
-def show(summary: ConversionSummary, out: Path) -> int:
+def show(summary: "ConversionSummary", out: Path) -> int:
     """Print what became of a conversion, and return the exit code."""
     for label, reason in summary.failed.items():
         say(f"Error: {label}: {reason}")
@@ -68,11 +67,13 @@ def show(summary: ConversionSummary, out: Path) -> int:
     return 1 if summary.failed else 0
 
 
-def _strays(out: Path, summary: ConversionSummary) -> list[Path]:
+def _strays(out: Path, summary: "ConversionSummary") -> list[Path]:
     """Return the logs that a conversion neither wrote nor found there.
 
     Unless it is for all splits, those of other splits do not count: each may be converted by a command of its own.
     """
+    from semgrid_eval.log.store import find_logs, label_of
+
     splits = {label.split("/")[0] for label in summary.labels}
     try:
         logs = find_logs(out)

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
-from semgrid_eval.cli.work import device_option, workers_option
+from semgrid_eval.cli.options import FOLDER, device_option, workers_option
 from semgrid_eval.config import parse_config
 from semgrid_eval.executors import local_executor
 
@@ -16,7 +16,7 @@ TOWNS = 8
 
 
 @click.command("demo", epilog="Example: semgrid-eval demo --out demo")
-@click.option("--out", default="demo", show_default=True, type=click.Path(path_type=Path, file_okay=False))
+@click.option("--out", default="demo", show_default=True, type=FOLDER)
 @click.option("--recordings", type=click.IntRange(4, 10_000), default=96, show_default=True, help="Drives to simulate.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
 @device_option

@@ -5,13 +5,13 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import progress, say
-from semgrid_eval.cli.work import chosen_executor, executor_options, workers_option
+from semgrid_eval.cli.options import FOLDER, THERE, chosen_executor, executor_options, workers_option
 from semgrid_eval.config import load_yaml, parse_config
 
 
 @click.command("grids", epilog="Example: semgrid-eval grids logs grids")
-@click.argument("logs", type=click.Path(path_type=Path, exists=True))
-@click.argument("out", type=click.Path(path_type=Path, file_okay=False))
+@click.argument("logs", type=THERE)
+@click.argument("out", type=FOLDER)
 @click.option("--config", type=click.Path(path_type=Path, dir_okay=False), help="Grid configuration (YAML).")
 @workers_option("Logs at once.")
 @executor_options

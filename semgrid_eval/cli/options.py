@@ -1,14 +1,22 @@
-"""Options of a command from the fields of a configuration, whose names, defaults and descriptions they share."""
+"""Options of commands: from the fields of a configuration, and those that say where the work is done."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 import click
 from pydantic.fields import FieldInfo
 
 from semgrid_eval.config import Config
+from semgrid_eval.executors import Executor, available_cores, local_executor
+from semgrid_eval.ray_executor import LOCAL, RayExecutor
+
+FOLDER = click.Path(path_type=Path, file_okay=False)
+THERE = click.Path(path_type=Path, exists=True)
+WORKERS = click.IntRange(1, 256)
+Command = TypeVar("Command", bound=Callable[..., Any])
+device_option = click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 
 
 def parameters_of(config: type[Config]) -> Iterator[click.Parameter]:
@@ -50,3 +58,33 @@ def _plain(annotation: Any) -> Any:  # noqa: ANN401 - a type annotation
         return _plain(get_args(annotation)[0])
     choices = [each for each in get_args(annotation) if each is not NoneType]
     return _plain(choices[0]) if NoneType in get_args(annotation) and len(choices) == 1 else annotation
+
+
+def workers_option(text: str) -> Callable[[Command], Command]:
+    """Return the option --workers, which is all cores unless given."""
+    return click.option("--workers", type=WORKERS, default=available_cores(), show_default="all cores", help=text)
+
+
+def executor_options(command: Command) -> Command:
+    """Add --executor and --address, in this order, to a command."""
+    address = click.option(
+        "--address", default=LOCAL, show_default=True, help="Of a running Ray cluster; 'local' starts one here."
+    )
+    executor = click.option("--executor", type=click.Choice([LOCAL, "ray"]), default=LOCAL, show_default=True)
+    return executor(address(command))
+
+
+def chosen_executor(
+    name: str, address: str, workers: int, *, gpus: float = 0.0, shared: Sequence[str] = ()
+) -> Executor:
+    """Make the executor that options ask for, `local` or `ray`.
+
+    `gpus` are for each piece of work on Ray, `shared` the GPUs that local processes share, as CUDA names them.
+
+    Raises:
+        MissingExtraError: Ray is asked for and not installed.
+        InputError: the cluster cannot be reached, or never has what a piece of work asks for.
+    """
+    if name == LOCAL:
+        return local_executor(workers, gpus=shared)
+    return RayExecutor(address, gpus=gpus, local_cpus=workers if address == LOCAL else None)

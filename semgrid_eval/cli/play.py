@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import progress, say
-from semgrid_eval.playback.write import write_playback
 
 
 @click.command("play", epilog="Example: semgrid-eval play runs/first BL-DC --out play.mcap --logs logs")
@@ -24,6 +23,8 @@ def command(run: Path, row: str, out: Path, logs: Path | None, recording: str | 
     recordings follow each other a second apart: the first keeps its times, those of the others are shifted. A layout
     for the viewer is written beside the log. Prints the path of the log.
     """
+    from semgrid_eval.playback.write import write_playback
+
     if every_recording and recording is not None:
         raise click.UsageError("--recording names one recording, --all plays all of them")
     with progress("play") as shown:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
-from semgrid_eval.cli.work import chosen_executor, device_option, executor_options, workers_option
+from semgrid_eval.cli.options import FOLDER, THERE, chosen_executor, device_option, executor_options, workers_option
 from semgrid_eval.executors import local_executor
 from semgrid_eval.ray_executor import LOCAL
 
@@ -16,18 +16,16 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.runs.runner import RunOptions
     from semgrid_eval.scores.results import RunRecord
 
-_FOLDER = click.Path(path_type=Path, file_okay=False)
-_THERE = click.Path(path_type=Path, exists=True)
 _TRAININGS = "Trained networks (default: OUT/trainings); those of another run are used where they fit."
 _MODEL = "One more row: a model of your own, path.py:Class, or an installed one."
 
 
 @click.command("run", epilog="Example: semgrid-eval run baselines --logs logs --out runs/first")
 @click.argument("matrix")
-@click.option("--logs", required=True, type=_THERE, help="Folder of MCAP logs.")
-@click.option("--out", required=True, type=_FOLDER, help="Folder of the run.")
-@click.option("--grids", type=_FOLDER, help="Grid cache (default: OUT/grids).")
-@click.option("--validation-logs", type=_THERE, help="Folder of the logs to score, where they are not in --logs.")
+@click.option("--logs", required=True, type=THERE, help="Folder of MCAP logs.")
+@click.option("--out", required=True, type=FOLDER, help="Folder of the run.")
+@click.option("--grids", type=FOLDER, help="Grid cache (default: OUT/grids).")
+@click.option("--validation-logs", type=THERE, help="Folder of the logs to score, where they are not in --logs.")
 @click.option("--trainings", type=click.Path(path_type=Path, file_okay=False, exists=True), help=_TRAININGS)
 @click.option("--model", "models", multiple=True, help=_MODEL)
 @click.option("--row", "only", multiple=True, help="Only this row, or rows like 'BL-*'; may be repeated.")

@@ -7,27 +7,22 @@ import click
 
 from semgrid_eval.cli.console import progress
 from semgrid_eval.cli.convert import show
-from semgrid_eval.cli.options import parameters_of
+from semgrid_eval.cli.options import FOLDER, THERE, WORKERS, parameters_of
 from semgrid_eval.config import parse_config
-from semgrid_eval.log.convert import Work
 from semgrid_eval.segmentation.config import SegmentationConfig
-from semgrid_eval.segmentation.relabel import segment_logs
 
-_LOG = click.Path(path_type=Path, exists=True)
 _MODEL = click.Path(path_type=Path, exists=True, dir_okay=False)
-_OUT = click.Path(path_type=Path, file_okay=False)
-_WORKERS = click.IntRange(1, 256)
 _SHARED = "Logs at once; they share the cores, all of which one log can use."
 
 
 @click.command(
     "segment",
     params=[
-        click.Argument(["logs"], metavar="LOG...", nargs=-1, required=True, type=_LOG),
+        click.Argument(["logs"], metavar="LOG...", nargs=-1, required=True, type=THERE),
         click.Option(["--model"], required=True, type=_MODEL, help="The ONNX file."),
-        click.Option(["--out"], required=True, type=_OUT, help="Folder of the new logs."),
+        click.Option(["--out"], required=True, type=FOLDER, help="Folder of the new logs."),
         *parameters_of(SegmentationConfig),
-        click.Option(["--workers"], type=_WORKERS, default=1, show_default=True, help=_SHARED),
+        click.Option(["--workers"], type=WORKERS, default=1, show_default=True, help=_SHARED),
     ],
     epilog="Example: semgrid-eval segment logs --model network.onnx --out labelled",
 )
@@ -39,5 +34,8 @@ def command(logs: tuple[Path, ...], model: Path, out: Path, workers: int, **opti
     logs is kept as it is. Logs whose log, model and options have not changed are left as they are; one that fails is
     named, and the exit code is then 1.
     """
+    from semgrid_eval.log.convert import Work
+    from semgrid_eval.segmentation.relabel import segment_logs
+
     config = parse_config(SegmentationConfig, options)
     return show(segment_logs(logs, model, config, out, Work(workers, stage=progress)), out)

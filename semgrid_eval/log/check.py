@@ -12,7 +12,7 @@ import numpy as np
 from semgrid_eval.classes import CITYSCAPES_LABELS
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.log import topics
-from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.png import decode_gray, read_header
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame, MotionSample

@@ -1,6 +1,12 @@
-"""Frames, motion and truth as the messages of a log, and back; reading a damaged message raises DecodeError."""
+"""What a log says of itself as its metadata, frames, motion and truth as its messages, and back.
 
+Reading a damaged message raises DecodeError.
+"""
+
+import json
 import math
+from dataclasses import dataclass
+from pathlib import PurePath
 
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration as CalibrationMessage
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
@@ -12,6 +18,8 @@ from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.files import digest_value
 from semgrid_eval.geometry import optical_quaternion
 from semgrid_eval.log.schemas.actors_pb2 import Actor as ActorMessage
 from semgrid_eval.log.schemas.actors_pb2 import Actors
@@ -20,11 +28,60 @@ from semgrid_eval.log.schemas.stereo_calibration_pb2 import CameraExtrinsics, St
 from semgrid_eval.log.topics import BASE_FRAME, GRID_FRAME, MAP_FRAME, ODOM_FRAME, optical_frame
 from semgrid_eval.recording.types import Actor, CameraCalibration, MotionSample, Pose
 
+RECORD = "semgrid.scene"
+"""The metadata record that says what a log is as a whole."""
+FORMAT_VERSION = 1
 _NS_PER_S = 1_000_000_000
 _GPS_FIELDS = ("latitude_deg", "longitude_deg", "heading_deg")
 _INTRINSICS = ("fx_px", "fy_px", "u0_px", "v0_px")
 _EXTRINSICS = ("x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad")
 _ACTOR_FIELDS = tuple(Actor.__dataclass_fields__)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A log's name, origin and cameras."""
+
+    name: str  # unique in its data set
+    dataset: str  # where the recording comes from: `cityscapes` or `synthetic`
+    split: str  # `train`, `val` or `test`
+    cameras: tuple[str, ...]  # their names, sorted
+    source_digest: str  # digest of everything that determined the content
+    class_names: tuple[str, ...] = CLASS_NAMES  # the grid classes when the log was written
+    group: str = ""  # the town, city or drive that it belongs to; empty where the log does not say
+
+    def to_metadata(self) -> dict[str, str]:
+        """Return the entries of the metadata record, with a digest of their own: MCAP has no checksum for them."""
+        entries = {
+            "format_version": str(FORMAT_VERSION),
+            "name": self.name,
+            "dataset": self.dataset,
+            "split": self.split,
+            "cameras": json.dumps(self.cameras),
+            "source_digest": self.source_digest,
+            "class_names": json.dumps(self.class_names),
+            **({"group": self.group} if self.group else {}),
+        }
+        return {**entries, "digest": digest_value(entries)}
+
+    @classmethod
+    def from_metadata(cls, entries: dict[str, str]) -> "Scene":
+        """Read the entries of the metadata record.
+
+        Raises:
+            ValueError: they are damaged, incomplete or of another format version.
+        """
+        given = {key: value for key, value in entries.items() if key != "digest"}
+        if entries.get("digest") != digest_value(given):
+            raise ValueError(f"metadata {RECORD} does not match its digest")
+        if given.get("format_version") != str(FORMAT_VERSION):
+            raise ValueError(f"its format version is {given.get('format_version')}; {FORMAT_VERSION} can be read")
+        for key in ("name", "split"):
+            if given[key] in ("", "..") or PurePath(given[key]).name != given[key]:
+                raise ValueError(f"its {key} {given[key]!r} is not a file name")
+        words = {name: given[name] for name in ("name", "dataset", "split", "source_digest")}
+        cameras, class_names = (tuple(json.loads(given[name])) for name in ("cameras", "class_names"))
+        return cls(**words, cameras=cameras, class_names=class_names, group=given.get("group", ""))
 
 
 def timestamp(stamp_ns: int) -> Timestamp:
@@ -154,7 +211,9 @@ def transforms_message(
     ]
     for camera, calibration in sorted(calibrations.items()):
         place = (calibration.x_m, calibration.y_m, calibration.z_m)
-        transforms.append(_transform(time, BASE_FRAME, optical_frame(camera), place, _optical_rotation(calibration)))
+        turn = optical_quaternion(calibration.roll_rad, calibration.pitch_rad, calibration.yaw_rad)
+        rotation = Quaternion(**dict(zip("xyzw", turn, strict=True)))
+        transforms.append(_transform(time, BASE_FRAME, optical_frame(camera), place, rotation))
     return FrameTransforms(transforms=transforms)
 
 
@@ -177,8 +236,3 @@ def _yaw_rad(turn: Quaternion) -> float:
     found = 2 * math.atan2(turn.z, turn.w)
     near = (found, math.nextafter(found, -math.inf), math.nextafter(found, math.inf))
     return next((yaw for yaw in near if (math.sin(yaw / 2), math.cos(yaw / 2)) == (turn.z, turn.w)), found)
-
-
-def _optical_rotation(calibration: CameraCalibration) -> Quaternion:
-    turn = optical_quaternion(calibration.roll_rad, calibration.pitch_rad, calibration.yaw_rad)
-    return Quaternion(**dict(zip("xyzw", turn, strict=True)))

@@ -8,7 +8,8 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from types import TracebackType
+from typing import BinaryIO, NamedTuple, Self
 
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
@@ -55,10 +56,13 @@ class Entry(NamedTuple):
 
 
 class Container:
-    """An open MCAP file whose summary was read and checked.
+    """An open MCAP file whose summary was read and checked; closes its file with its block, or by `close`.
+
+    `has_checksums` says whether the writer gave checksums of data and index, so that any damage is seen.
 
     Raises:
-        LogError: the file cannot be read, is not an MCAP file, ends early or has no index.
+        LogError: the file cannot be read, is not an MCAP file, ends early or has no index; damage that only shows when
+            more is read is raised then, by every method that reads.
     """
 
     def __init__(self, path: Path) -> None:
@@ -68,15 +72,22 @@ class Container:
             try:
                 self._load()
             except BaseException:
-                self._stream.close()
+                self.close()
                 raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        self.close()
 
     def close(self) -> None:
         """Close the file."""
         self._stream.close()
 
+    @property
     def digest(self) -> str:
-        """Digest what the file says of its own content: its index and the checksum of all its data.
+        """Digest of the file's own index and checksum of its data (16 hexadecimal characters).
 
         The bytes themselves are hashed only where the writer left that checksum out.
         """
@@ -84,12 +95,8 @@ class Container:
             return digest_files([self.path])
         return hashlib.sha256(self._tail).hexdigest()[:DIGEST_CHARACTERS]
 
-    def entries(self, topics: Iterable[str] | None = None) -> Iterator[Entry]:
-        """Iterate over the messages of some topics, or of all, in the order of time; equal times in that of the file.
-
-        Raises:
-            LogError: what is read is damaged.
-        """
+    def messages(self, topics: Iterable[str] | None = None) -> Iterator[Entry]:
+        """Iterate over the messages of some topics, or of all, in the order of time, then of the file."""
         channels = self.summary.channels
         names = None if topics is None else set(topics)
         wanted = {number: each.topic for number, each in channels.items() if names is None or each.topic in names}
@@ -104,11 +111,7 @@ class Container:
                 yield heapq.heappop(heap)[-1]
 
     def metadata(self, name: str) -> dict[str, str] | None:
-        """Return the entries of the one metadata record of this name, None where there is none.
-
-        Raises:
-            LogError: the record is damaged or there are several.
-        """
+        """Return the entries of the one metadata record of this name, None where there is none."""
         found = [index for index in self.summary.metadata_indexes if index.name == name]
         if not found:
             return None
@@ -120,11 +123,7 @@ class Container:
             return record.metadata
 
     def attachments(self) -> dict[str, bytes]:
-        """Return the attached files by name.
-
-        Raises:
-            LogError: an attachment is damaged, or two have one name.
-        """
+        """Return the attached files by name, which are the source's, kept for the record; no two may have one name."""
         found: dict[str, bytes] = {}
         for index in self.summary.attachment_indexes:
             with damage_as_log_error(self.path):
@@ -138,14 +137,10 @@ class Container:
                 found[index.name] = attachment.data
         return found
 
-    def verify_data(self) -> bool:
-        """Verify the checksum of the whole data section; return False where the writer left it out.
-
-        Raises:
-            LogError: they differ.
-        """
+    def verify(self) -> None:
+        """Compare the checksum of all data, where the writer did not leave it out, with the bytes."""
         if not self._data_crc:
-            return False
+            return
         crc, left = 0, self._data_end
         with damage_as_log_error(self.path):
             self._stream.seek(0)
@@ -155,7 +150,6 @@ class Container:
                 left -= len(block)
         if crc != self._data_crc:
             raise LogError("is damaged: the checksum of its data does not match", path=self.path)
-        return True
 
     def _load(self) -> None:
         size = self._stream.seek(0, io.SEEK_END)

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from semgrid_eval.errors import InputError, LogError, SemgridError
 from semgrid_eval.executors import Executor, InProcess, WorkerDied, local_executor
-from semgrid_eval.log.store import SUFFIX, LogReader, write_log
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import SUFFIX, write_log
 from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.recording.types import Recording
 
@@ -80,7 +81,9 @@ def convert_jobs(
     Raises:
         InputError: two recordings have one name, or the disk is full.
     """
-    _refuse_duplicates(jobs)
+    for label_of_job, count in Counter(job.label for job in jobs).items():
+        if count > 1:
+            raise InputError("two recordings have this name", field=label_of_job)
     summary = ConversionSummary()
     executor = work.executor or local_executor(work.workers)
     with work.stage(label) as progress:
@@ -120,7 +123,9 @@ def _convert(job: ConversionJob, out: Path) -> _Outcome:
         write_log(job.load(), path)
     except (SemgridError, OSError) as error:  # OSError: of a file that the source did not find
         stale = f" (the log of an earlier conversion stays: {path})" if path.exists() else ""
-        return _Outcome(written=False, failure=f"{error}{stale}", disk_full=_is_disk_full(error))
+        cause = error.__cause__
+        disk_full = isinstance(cause, OSError) and cause.errno in _DISK_FULL  # every further log would fail alike
+        return _Outcome(written=False, failure=f"{error}{stale}", disk_full=disk_full)
     return _Outcome(written=True)
 
 
@@ -128,15 +133,8 @@ def _itself(recording: Recording) -> Recording:
     return recording
 
 
-def _is_disk_full(error: Exception) -> bool:
-    """Whether every further log would fail alike."""
-    return isinstance(error.__cause__, OSError) and error.__cause__.errno in _DISK_FULL
-
-
 def _is_current(path: Path, digest: str) -> bool:
     """Whether the log is there, whole and made from inputs of this digest."""
-    if not path.exists():
-        return False
     try:
         with LogReader(path) as log:
             if log.scene.source_digest != digest:
@@ -145,9 +143,3 @@ def _is_current(path: Path, digest: str) -> bool:
     except LogError:
         return False
     return True
-
-
-def _refuse_duplicates(jobs: Sequence[ConversionJob]) -> None:
-    for label, count in Counter(job.label for job in jobs).items():
-        if count > 1:
-            raise InputError("two recordings have this name", field=label)

@@ -9,7 +9,7 @@ from typing import TypeVar
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.executors import Executor, WorkerDied
 from semgrid_eval.files import DIGEST_CHARACTERS, read_json, write_json
-from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.progress import Progress
 
 R = TypeVar("R")

@@ -17,7 +17,6 @@ from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
 from semgrid_eval.log.topics import GRID_FRAME
 
 Values = NDArray[np.uint8]
-_COLOURS = ("red", "green", "blue", "alpha")
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ def viewer_message(stamp_ns: int, values: Values, layer: GridLayer, place: GridP
     rows, columns = values.shape
     along_x = values[::-1, ::-1].T  # (W, H): first row farthest right, first column nearest
     cells = np.concatenate([layer.rgba[along_x], along_x[..., None]], axis=-1)  # (W, H, 5)
-    fields = (*_COLOURS, layer.field)
+    fields = ("red", "green", "blue", "alpha", layer.field)
     corner = Vector3(x=place.corner_x_m - rows * place.cell_m, y=place.corner_y_m - columns * place.cell_m, z=0.0)
     uint8 = PackedElementField.UINT8
     return Grid(

@@ -2,34 +2,53 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import groupby, product
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.log import codec, topics
-from semgrid_eval.log.container import Container, Entry, damage_as_log_error
-from semgrid_eval.log.moments import Decoded, Picture, camera_frames, gather_moments, moment_decoders, picture_topics
-from semgrid_eval.log.scene import RECORD, Scene
+from semgrid_eval.log.codec import RECORD, Scene
+from semgrid_eval.log.container import Container, damage_as_log_error
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose
 
 T = TypeVar("T")
+_DECODERS: dict[str, Callable[[bytes], Any]] = {
+    topics.EGO_MOTION: codec.read_motion,
+    **dict.fromkeys((topics.EGO_POSE, topics.TRUE_POSE), codec.read_pose),
+    topics.TRUE_ACTORS: codec.read_actors,
+}
 
 
-class LogReader:
-    """One log, read lazily; closes its file with its block, or by `close`.
+class Picture(NamedTuple):
+    """A PNG file of a camera; `channel` is one of `topics.PICTURES`."""
+
+    stamp_ns: int
+    camera: str
+    channel: str
+    png: bytes
+
+
+class Decoded(NamedTuple):
+    """What a message says, and its topic and time."""
+
+    topic: str
+    stamp_ns: int
+    value: Any
+
+
+class LogReader(Container):
+    """One log, read lazily; a `Container` that knows what its messages say.
 
     Raises:
-        LogError: the file cannot be read, is damaged, was not written to the end, or is not a log of this package;
-            damage that only shows when more is read is raised then, by every method that reads.
+        LogError: as a container does, and where the file is not a log of this package.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self._container = Container(path)
+        super().__init__(path)
         try:
-            entries = self._container.metadata(RECORD)
+            entries = self.metadata(RECORD)
             if entries is None:
                 raise LogError(f"has no metadata record {RECORD}; it was not written by semgrid-eval", path=path)
             with damage_as_log_error(path):
@@ -38,25 +57,10 @@ class LogReader:
             self.close()
             raise
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._container.close()
-
-    @property
-    def digest(self) -> str:
-        """Digest of the content, from the log's own index and checksums (16 hexadecimal characters)."""
-        return self._container.digest()
-
     @property
     def start_ns(self) -> int:
         """When the log begins: the time of its first message, 0 where it has none."""
-        return min((index.message_start_time for index in self._container.summary.chunk_indexes), default=0)
+        return min((index.message_start_time for index in self.summary.chunk_indexes), default=0)
 
     def choose_camera(self, wanted: str | None) -> str:
         """Return the camera that is wanted, or the log's only one where none is.
@@ -71,48 +75,23 @@ class LogReader:
             raise LogError(f"{wanted or '(not given)'} is not one of: {known}", path=self.path, field="camera")
         return chosen
 
-    def verify(self) -> None:
-        """Compare the checksum of everything in the file with its bytes.
-
-        Raises:
-            LogError: they differ.
-        """
-        self._container.verify_data()
-
-    @property
-    def has_checksums(self) -> bool:
-        """Whether the writer gave checksums of data and index, so that any damage is seen."""
-        return self._container.has_checksums
-
     def schemas(self) -> dict[str, str]:
         """Return the name of the message type by topic."""
-        summary = self._container.summary
-        return {
-            channel.topic: summary.schemas[channel.schema_id].name if channel.schema_id in summary.schemas else ""
-            for channel in summary.channels.values()
-        }
+        names = {number: schema.name for number, schema in self.summary.schemas.items()}
+        return {each.topic: names.get(each.schema_id, "") for each in self.summary.channels.values()}
 
     def stamps_ns(self) -> dict[str, list[int]]:
-        """Return the times of all messages by topic, ascending; this reads the whole file.
-
-        Raises:
-            LogError: what is read is damaged, or the index states another number of messages.
-        """
+        """Return the times of all messages by topic, ascending; this reads the whole file."""
         found: dict[str, list[int]] = {topic: [] for topic in self.schemas()}
-        for entry in self._container.entries():
+        for entry in self.messages():
             found[entry.topic].append(entry.log_ns)
         count = sum(len(stamps) for stamps in found.values())
-        if count != self._container.message_count:
-            stated = self._container.message_count
-            raise LogError(f"holds {count} messages, but its index states {stated}", path=self.path)
+        if count != self.message_count:
+            raise LogError(f"holds {count} messages, but its index states {self.message_count}", path=self.path)
         return found
 
     def calibration(self, camera: str) -> CameraCalibration:
-        """Return the calibration of a camera.
-
-        Raises:
-            LogError: there is no such camera, or its calibration is damaged or impossible.
-        """
+        """Return the calibration of a camera."""
         self.choose_camera(camera)
         known = self._first(camera_topic(camera, topics.CALIBRATION))
         rest = self._first(camera_topic(camera, topics.STEREO))
@@ -125,11 +104,7 @@ class LogReader:
             raise LogError(str(error), path=self.path, field=camera_topic(camera, topics.CALIBRATION)) from error
 
     def motion(self) -> list[MotionSample]:
-        """Return all that the vehicle reported of its motion, in the order of time.
-
-        Raises:
-            LogError: a sample is damaged or not a finite number.
-        """
+        """Return all that the vehicle reported of its motion, finite numbers, in the order of time."""
         samples = list(self._values(topics.EGO_MOTION, codec.read_motion))
         for sample in samples:
             if not (math.isfinite(sample.speed_mps) and math.isfinite(sample.yaw_rate_radps)):
@@ -145,9 +120,21 @@ class LogReader:
         return self._values(topics.TRUE_ACTORS, codec.read_actors)
 
     def moments(self) -> Iterator[Moment]:
-        """Iterate over all that the log holds, moment by moment, in the order of time."""
-        cameras = self.scene.cameras
-        return gather_moments(self._decoded(moment_decoders(cameras)), cameras)
+        """Iterate over all that the log holds, in the order of time.
+
+        A moment is all that has one stamp; motion belongs to the moment that comes next.
+        """
+        shown = picture_topics(self.scene.cameras, topics.PICTURE_FIELDS)
+        decoders = {**_DECODERS, **dict.fromkeys(shown, codec.read_image)}
+        waiting: list[MotionSample] = []
+        messages = _apart_from_motion(self._decoded(decoders), waiting)
+        for stamp_ns, of_one_time in groupby(messages, key=lambda message: message.stamp_ns):
+            motion = tuple(waiting)
+            waiting.clear()
+            found = {topic: value for topic, _, value in of_one_time}
+            pictures = [Picture(stamp_ns, *shown[topic], value) for topic, value in found.items() if topic in shown]
+            _, actors = found.get(topics.TRUE_ACTORS, (stamp_ns, None))
+            yield Moment(stamp_ns, dict(camera_frames(pictures)), motion, found.get(topics.TRUE_POSE), actors)
 
     def pictures(self, cameras: Iterable[str], channels: Iterable[str]) -> Iterator[Picture]:
         """Iterate over the pictures of some channels of some cameras in the order of time."""
@@ -159,29 +146,14 @@ class LogReader:
         """Iterate over the frames of a camera in the order of time, one chunk of the file in memory at once.
 
         Messages of equal stamps make a frame. A frame without label, or truth, has None there; one without disparity,
-        which could not be placed in the world, is left out.
-
-        Args:
-            camera: its name.
-            images: whether to read the colour images as well.
-
-        Raises:
-            LogError: there is no such camera.
+        which could not be placed in the world, is left out. Colour images are read only where `images` says so.
         """
         self.choose_camera(camera)
         channels = [channel for channel in topics.PICTURE_FIELDS if images or channel != topics.IMAGE]
         return (frame for _, frame in camera_frames(self.pictures([camera], channels)))
 
-    def messages(self, names: Iterable[str]) -> Iterator[Entry]:
-        """Iterate over topic, time (ns) and data of some topics' messages, in the order of time, then of the file."""
-        return self._container.entries(names)
-
-    def source_files(self) -> dict[str, bytes]:
-        """Return the source's files that are kept for the record, by name."""
-        return self._container.attachments()
-
     def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
-        """Iterate over what the messages of some topics say; `decoders` maps topics to what reads their messages."""
+        """Iterate over what messages say; `decoders` maps topics to what reads their messages."""
         for topic, stamp_ns, data in self.messages(decoders):
             with damage_as_log_error(self.path):
                 value = decoders[topic](data)
@@ -191,7 +163,37 @@ class LogReader:
         return (decoded.value for decoded in self._decoded({topic: decode}))
 
     def _first(self, topic: str) -> bytes:
-        entry = next(self._container.entries([topic]), None)
+        entry = next(self.messages([topic]), None)
         if entry is None:
             raise LogError("has no message", path=self.path, field=topic)
         return entry.data
+
+
+def picture_topics(cameras: Iterable[str], channels: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Return camera and channel by topic."""
+    return {camera_topic(camera, channel): (camera, channel) for camera, channel in product(cameras, channels)}
+
+
+def _apart_from_motion(messages: Iterable[Decoded], motion: list[MotionSample]) -> Iterator[Decoded]:
+    """Pass messages on, but move what they say of the motion to a list."""
+    for message in messages:
+        if message.topic == topics.EGO_MOTION:
+            motion.append(message.value)
+        else:
+            yield message
+
+
+def camera_frames(pictures: Iterable[Picture]) -> Iterator[tuple[str, CameraFrame]]:
+    """Make frames of pictures in the order of time: those of one camera and one stamp, and the camera's name.
+
+    A frame without label, image or truth has None there; one without disparity, which could not be placed in the
+    world, is left out.
+    """
+    for stamp_ns, of_one_time in groupby(pictures, key=lambda picture: picture.stamp_ns):
+        by_camera: dict[str, dict[str, bytes]] = {}
+        for picture in of_one_time:
+            by_camera.setdefault(picture.camera, {})[topics.PICTURE_FIELDS[picture.channel]] = picture.png
+        for camera, found in by_camera.items():
+            image_png, label_png = found.pop("image_png", None), found.pop("label_png", None)
+            if "disparity_png" in found:
+                yield camera, CameraFrame(stamp_ns, image_png=image_png, label_png=label_png, **found)

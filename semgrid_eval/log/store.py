@@ -6,13 +6,10 @@ from pathlib import Path
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file
-from semgrid_eval.log.moments import MomentWriter
+from semgrid_eval.log.codec import RECORD, Scene
 from semgrid_eval.log.reader import LogReader
-from semgrid_eval.log.scene import RECORD, Scene
-from semgrid_eval.log.writer import MessageWriter
+from semgrid_eval.log.writer import MessageWriter, MomentWriter
 from semgrid_eval.recording.types import Moment, Recording
-
-__all__ = ["SUFFIX", "LogReader", "find_logs", "label_of", "read_recording", "write_log"]
 
 SUFFIX = ".mcap"
 
@@ -56,7 +53,8 @@ def write_log(recording: Recording, path: Path) -> None:
     with atomic_file(path) as stream, MessageWriter(stream) as writer:
         writer.metadata(RECORD, scene.to_metadata())
         for name, data in sorted(recording.source_files.items()):
-            writer.attach(name, _media_type(name), data)
+            media_type = "application/json" if name.endswith(".json") else "application/octet-stream"
+            writer.attach(name, media_type, data)
         MomentWriter(writer, recording).write()
 
 
@@ -77,14 +75,10 @@ def read_recording(path: Path) -> Recording:
             calibrations={camera: log.calibration(camera) for camera in log.scene.cameras},
             source_digest=log.scene.source_digest,
             moments=partial(_moments, path),
-            source_files=log.source_files(),
+            source_files=log.attachments(),
         )
 
 
 def _moments(path: Path) -> Iterator[Moment]:
     with LogReader(path) as log:
         yield from log.moments()
-
-
-def _media_type(name: str) -> str:
-    return "application/json" if name.endswith(".json") else "application/octet-stream"

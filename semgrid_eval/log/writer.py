@@ -1,4 +1,4 @@
-"""Write protobuf messages to an MCAP stream: all indexes, all checksums, and equal bytes for equal input."""
+"""Write recordings as messages to an MCAP stream: all indexes, all checksums, and equal bytes for equal input."""
 
 from collections import Counter
 from types import TracebackType
@@ -9,6 +9,13 @@ from google.protobuf.message import Message
 from mcap.writer import CompressionType, IndexType, Writer
 
 from semgrid_eval import __version__
+from semgrid_eval.classes import label_palette
+from semgrid_eval.errors import InputError
+from semgrid_eval.log import codec, topics
+from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.motion import EgoMotion
+from semgrid_eval.recording.png import read_header, with_palette
+from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 
 CHUNK_BYTES = 1 << 20
 
@@ -97,3 +104,73 @@ def _file_descriptor_set(message: Message) -> bytes:
         files[file.name] = FileDescriptorProto.FromString(file.serialized_pb)
         pending.extend(file.dependencies)
     return FileDescriptorSet(file=reversed(files.values())).SerializeToString(deterministic=True)
+
+
+class MomentWriter:
+    """Writes the moments of a recording as messages."""
+
+    def __init__(self, writer: MessageWriter, recording: Recording) -> None:
+        self._writer = writer
+        self._recording = recording
+        self._ego_motion = EgoMotion()  # as far as it is known by each moment
+        self._palette = label_palette()
+        self._last_ns = -1
+
+    def write(self) -> None:
+        """Write everything.
+
+        Raises:
+            InputError: the source is at fault, or its moments are not in the order of time.
+        """
+        count = 0
+        for moment in self._recording.moments():
+            self._motion(moment)
+            self._advance(moment.stamp_ns, "moment")
+            self._vehicle(moment)
+            for camera in sorted(moment.cameras):
+                self._camera(camera, moment.cameras[camera])
+            count += 1
+        if not count:
+            raise InputError("holds no frame", field=self._recording.name)
+
+    def _advance(self, stamp_ns: int, what: str) -> None:
+        if stamp_ns < self._last_ns:
+            message = f"{what} at {stamp_ns} ns comes after {self._last_ns} ns"
+            raise InputError(message, field=f"{self._recording.name}: stamp_ns")
+        self._last_ns = stamp_ns
+
+    def _motion(self, moment: Moment) -> None:
+        for sample in moment.motion:
+            self._advance(sample.stamp_ns, "motion sample")
+            self._ego_motion.add(sample)
+            self._writer.write(topics.EGO_MOTION, codec.motion_message(sample), log_ns=sample.stamp_ns)
+
+    def _vehicle(self, moment: Moment) -> None:
+        now_ns = moment.stamp_ns
+        pose = self._ego_motion.pose_at(now_ns)
+        transforms = codec.transforms_message(pose, self._recording.calibrations)
+        self._writer.write(topics.TRANSFORMS, transforms, log_ns=now_ns)
+        self._writer.write(topics.EGO_POSE, codec.pose_message(pose, topics.ODOM_FRAME), log_ns=now_ns)
+        if moment.pose is not None:
+            message = codec.pose_message(moment.pose, topics.MAP_FRAME)
+            self._writer.write(topics.TRUE_POSE, message, log_ns=now_ns)
+        if moment.actors is not None:
+            self._writer.write(topics.TRUE_ACTORS, codec.actors_message(now_ns, moment.actors), log_ns=now_ns)
+
+    def _camera(self, camera: str, frame: CameraFrame) -> None:
+        header = read_header(frame.disparity_png)
+        calibration = self._recording.calibrations[camera]
+        known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, (header.width, header.height))
+        self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
+        self._writer.write(camera_topic(camera, topics.STEREO), rest, log_ns=frame.stamp_ns)
+        for picture, (channel, notes) in topics.PICTURES.items():
+            png: bytes | None = getattr(frame, picture)
+            if png is None:
+                continue
+            if channel in (topics.LABEL, topics.EXACT_LABEL):
+                png = with_palette(png, self._palette)
+            if channel == topics.IMAGE:
+                self._writer.end_chunk()
+            message = codec.image_message(frame.stamp_ns, camera, png)
+            self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes)
+        self._writer.end_chunk()

@@ -1,6 +1,6 @@
 """PNG files as bytes: read headers, decode gray and palette pictures, add palettes to label images without decoding.
 
-A `path` is where the bytes come from, for error messages.
+A `path` is where the bytes come from, for the InputError that is raised where they are damaged or not what is needed.
 """
 
 import io
@@ -46,12 +46,7 @@ class _Chunk(NamedTuple):
 
 
 def read_header(data: bytes, path: Path | None = None) -> PngHeader:
-    """Read the header of a PNG file and make sure that the file is whole.
-
-    Raises:
-        InputError: it is not a PNG file, a chunk's checksum is wrong, its end is missing, it has several headers, or
-            its size is out of bounds.
-    """
+    """Read the header of a PNG file; make sure that the file is whole, has one header and a size within bounds."""
     chunks = list(_chunks(data, path))
     kinds = [chunk.kind for chunk in chunks]
     if kinds[:1] != [b"IHDR"] or chunks[0].end - chunks[0].start != _HEADER.size + _CHUNK_OVERHEAD_BYTES:
@@ -67,11 +62,7 @@ def read_header(data: bytes, path: Path | None = None) -> PngHeader:
 
 
 def decode_gray(data: bytes, *, bit_depth: int, path: Path | None = None) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """Decode a gray picture, or the indices of a palette picture, exactly: (H, W) uint8 or uint16.
-
-    Raises:
-        InputError: the file is damaged, of another depth than `bit_depth` (8 or 16), or not gray.
-    """
+    """Decode a gray picture, or the indices of a palette picture, of 8 or 16 bits exactly: (H, W) uint8 or uint16."""
     header = read_header(data, path)
     if header.bit_depth != bit_depth or header.colour_type not in (GRAY, PALETTE):
         raise InputError(f"is {header}; {bit_depth} bit gray is needed", path=path)
@@ -80,11 +71,7 @@ def decode_gray(data: bytes, *, bit_depth: int, path: Path | None = None) -> NDA
 
 
 def decode_ids(data: bytes, path: Path | None = None) -> NDArray[np.uint8]:
-    """Decode ids of at most 8 bits from a gray or palette picture: (H, W).
-
-    Raises:
-        InputError: the file is damaged, of more than 8 bits, or a colour picture.
-    """
+    """Decode ids of at most 8 bits from a gray or palette picture: (H, W)."""
     header = read_header(data, path)
     if header.bit_depth > 8 or header.colour_type not in (GRAY, PALETTE):
         raise InputError(f"is {header}; ids of at most 8 bits are needed, gray or palette", path=path)
@@ -95,11 +82,7 @@ def decode_ids(data: bytes, path: Path | None = None) -> NDArray[np.uint8]:
 
 
 def decode_colour(data: bytes, path: Path | None = None) -> NDArray[np.uint8]:
-    """Decode a picture of at most 8 bits a channel as RGB: (H, W, 3); gray is repeated, alpha left out.
-
-    Raises:
-        InputError: the file is damaged or of more than 8 bits.
-    """
+    """Decode a picture of at most 8 bits a channel as RGB: (H, W, 3); gray is repeated, alpha left out."""
     header = read_header(data, path)
     if header.bit_depth > 8:
         raise InputError(f"is {header}; at most 8 bits a channel are needed", path=path)
@@ -116,11 +99,7 @@ def encode_gray(picture: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
 
 
 def with_palette(data: bytes, palette: NDArray[np.uint8], path: Path | None = None) -> bytes:
-    """Turn an 8-bit gray or palette PNG file into one of an sRGB palette (256, 3), its compressed pixels untouched.
-
-    Raises:
-        InputError: the file is damaged, not 8 bit or not gray.
-    """
+    """Turn an 8-bit gray or palette PNG file into one of an sRGB palette (256, 3), its compressed pixels untouched."""
     header = read_header(data, path)
     if header.bit_depth != 8 or header.colour_type not in (GRAY, PALETTE):
         raise InputError(f"is {header}; 8 bit gray is needed", path=path)

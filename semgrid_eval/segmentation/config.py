@@ -5,13 +5,10 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from semgrid_eval.config import Config
-from semgrid_eval.recording.png import MAX_PIXELS
 
 Channels = tuple[float, float, float]
 Spread = Annotated[float, Field(gt=0)]
-Side = Annotated[int, Field(ge=1, le=MAX_PIXELS)]
-
-
+Side = Annotated[int, Field(ge=1)]
 Resampling = Literal["bilinear", "nearest"]
 _SIZE = "Width and height for the network.  [default: the image's]"
 _OUTPUT = "Which output of the model to read, where there are several."

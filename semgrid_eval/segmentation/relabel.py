@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.files import digest_files, digest_value
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
-from semgrid_eval.log.store import LogReader, find_logs, read_recording
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import find_logs, read_recording
 from semgrid_eval.recording.png import decode_colour, encode_gray
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 from semgrid_eval.segmentation.config import SegmentationConfig
@@ -31,14 +32,8 @@ def segment_logs(
     """Write the log OUT/<split>/<name>.mcap for each log: all it holds, its label images made by a network.
 
     A log that is whole and was made from the same log, model and config is left as it is. One that fails is named in
-    the summary with its reason.
-
-    Args:
-        logs: files, and folders of which all logs are taken.
-        model: the ONNX file; files beside it whose names begin with its name (its weights) count as part of it.
-        config: how the model is to be used.
-        out: the folder of the new logs; it must not contain, or be inside, one of `logs`.
-        work: how it is done.
+    the summary with its reason. `logs` are files, and folders of which all logs are taken; `model` is the ONNX file,
+    and files beside it whose names begin with its name (its weights) count as part of it.
 
     Raises:
         MissingExtraError: ONNX Runtime is not installed.
@@ -48,7 +43,8 @@ def segment_logs(
     _refuse_mixing(logs, out)
     paths = [path for given in logs for path in (find_logs(given) if given.is_dir() else [given])]
     SegmentationNetwork(model, config)  # a model that cannot be used is one error, not one for each log
-    recipe = _Recipe(model, digest_files(_files_of(model)), config)
+    parts = sorted(path for path in model.parent.glob(f"{escape(model.name)}*") if path.is_file())
+    recipe = _Recipe(model, digest_files(parts), config)
     return convert_jobs([_job(path, recipe) for path in paths], out, work, label="segment")
 
 
@@ -119,10 +115,6 @@ def _job(path: Path, recipe: _Recipe) -> ConversionJob:
 def _network(model: Path, model_digest: str, config: SegmentationConfig) -> SegmentationNetwork:
     """Open a model once for all logs of a process."""
     return SegmentationNetwork(model, config)
-
-
-def _files_of(model: Path) -> list[Path]:
-    return sorted(path for path in model.parent.glob(f"{escape(model.name)}*") if path.is_file())
 
 
 def _refuse_mixing(logs: Sequence[Path], out: Path) -> None:

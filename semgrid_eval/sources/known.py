@@ -1,10 +1,32 @@
-"""The sources that the command line offers, one line each."""
+"""What every source offers, and the sources that the command line offers, one line each."""
 
 import importlib
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
+from semgrid_eval.config import Config
 from semgrid_eval.errors import MissingExtraError
-from semgrid_eval.sources.source import Source
+
+if TYPE_CHECKING:  # it is heavy, and the help of the commands should not wait for it
+    from semgrid_eval.log.convert import ConversionSummary, Work
+
+C = TypeVar("C", bound=Config)
+
+
+@dataclass(frozen=True)
+class Source(Generic[C]):
+    """What makes recordings, as the command line offers it.
+
+    Each field of `options` is an option, described by its `description`; a path without default is an argument.
+    """
+
+    options: type[C]
+    convert: "Callable[[C, Path, Work], ConversionSummary]"  # writes the logs OUT/<split>/<name>.mcap of what is chosen
+    help: str  # what the command does
+    example: str  # a use of the command
+    cache: str = ""  # what the source keeps in the folder `Work.cache`, and where that is by default; empty if nothing
 
 
 class Known(NamedTuple):
@@ -15,9 +37,9 @@ class Known(NamedTuple):
 
 
 SOURCES = {
-    "cityscapes": Known("semgrid_eval.sources.cityscapes.convert:SOURCE"),
+    "cityscapes": Known("semgrid_eval.sources.cityscapes.tree:SOURCE"),
     "synthetic": Known("semgrid_eval.sources.town.convert:SOURCE", extra="synthetic"),
-    "town-v1": Known("semgrid_eval.sources.town.benchmark:TOWN_V1", extra="synthetic"),
+    "town-v1": Known("semgrid_eval.sources.town.convert:TOWN_V1", extra="synthetic"),
 }
 
 

@@ -9,7 +9,8 @@ from support.cityscapes_tree import Tree, put
 from semgrid_eval.cli.convert import command
 from semgrid_eval.cli.main import main
 from semgrid_eval.log.check import check_log
-from semgrid_eval.log.store import LogReader, find_logs
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import find_logs
 from semgrid_eval.sources.known import load_source
 
 

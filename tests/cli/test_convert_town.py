@@ -9,11 +9,12 @@ from support.towns import SMALL, town_cache
 
 from semgrid_eval.cli.main import cli, main
 from semgrid_eval.log.fingerprint import fingerprint
-from semgrid_eval.log.store import LogReader, find_logs
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import find_logs
 from semgrid_eval.sources.benchmarks import BenchmarkSize, SplitSize, load_benchmark
 from semgrid_eval.sources.known import load_source
-from semgrid_eval.sources.town import benchmark, sumo
-from semgrid_eval.sources.town.benchmark import versions
+from semgrid_eval.sources.town import convert, simulation
+from semgrid_eval.sources.town.convert import versions
 
 LABELS = ("train/town00_000000_000000", "val/town01_000001_000000")
 
@@ -38,7 +39,7 @@ def tiny(fingerprints=None, made_with=None):
 @pytest.fixture
 def define(monkeypatch):
     """Return what replaces the benchmark by a tiny one."""
-    return lambda *given: monkeypatch.setattr(benchmark, "load_benchmark", lambda name: tiny(*given))
+    return lambda *given: monkeypatch.setattr(convert, "load_benchmark", lambda name: tiny(*given))
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,7 @@ def rendered(tmp_path_factory):
     """Logs of the tiny benchmark, rendered once in this process."""
     out = tmp_path_factory.mktemp("rendered")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(benchmark, "load_benchmark", lambda name: tiny())
+        patch.setattr(convert, "load_benchmark", lambda name: tiny())
         done = CliRunner().invoke(cli, ["convert", *benchmark_options(out, 1)])
     assert done.exit_code == 0, done.output
     return out, done.output
@@ -170,7 +171,7 @@ def test_a_failure_of_sumo_is_one_line_with_its_own_message(tmp_path, monkeypatc
     tool.parent.mkdir(parents=True)
     tool.write_text("#!/bin/sh\necho 'Error: the street is closed.' >&2\nexit 1\n")
     tool.chmod(0o755)
-    monkeypatch.setattr(sumo, "sumo_home", lambda: tmp_path / "sumo")
+    monkeypatch.setattr(simulation, "sumo_home", lambda: tmp_path / "sumo")
     code, lines = run(capsys, "synthetic", tmp_path / "logs", "--recordings", 2, "--workers", 1)
     assert (code, lines) == (1, ["Error: SUMO's netgenerate failed with exit code 1: the street is closed."])
     assert list((tmp_path / "logs/.towns").iterdir()) == []

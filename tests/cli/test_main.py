@@ -48,6 +48,19 @@ def told_at_termination(process):
     return process.returncode, said.strip()
 
 
+def test_help_does_not_wait_for_heavy_packages():
+    program = """
+import sys
+from semgrid_eval.cli.main import cli
+cli.main(["--help"], standalone_mode=False)
+print(sorted({"numpy", "pandas", "torch", "cv2"} & sys.modules.keys()))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    *shown, heavy = done.stdout.splitlines()
+    assert heavy == "[]"
+    assert sum(line.startswith("  ") for line in shown) > 9  # every command, with a line of help
+
+
 def test_a_terminated_conversion_leaves_nothing_half_written_and_says_that_it_goes_on(tmp_path):
     tree, logs = Tree(tmp_path / "src"), tmp_path / "logs"
     (name,) = tree.write([0])

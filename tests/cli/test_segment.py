@@ -13,7 +13,8 @@ from support.onnx_models import colour_network
 from semgrid_eval.cli.main import main
 from semgrid_eval.cli.segment import command
 from semgrid_eval.log.check import check_log
-from semgrid_eval.log.store import LogReader, write_log
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.png import decode_gray
 
 PLAIN = ("--mean", 0, 0, 0, "--std", 1, 1, 1)

@@ -10,7 +10,7 @@ from support.driving import driving
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.log.convert import ConversionJob, Work, convert_jobs, convert_recordings
-from semgrid_eval.log.store import LogReader
+from semgrid_eval.log.reader import LogReader
 
 
 def refuse(reason):

@@ -8,7 +8,8 @@ from semgrid_eval.errors import LogError
 from semgrid_eval.executors import InProcess
 from semgrid_eval.log import writer
 from semgrid_eval.log.fingerprint import KEPT, fingerprint, fingerprints, kept_fingerprints
-from semgrid_eval.log.store import LogReader, write_log
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import write_log
 from semgrid_eval.progress import silent
 
 

@@ -4,12 +4,11 @@ import json
 from collections import Counter
 
 import pytest
-from support.cityscapes_tree import Tree
+from support.cityscapes_tree import Tree, only
 from support.driving import driving
 from support.independent_reader import of_topic, read, reader_script, sha256
 
 from semgrid_eval.log.store import write_log
-from semgrid_eval.sources.cityscapes.tree import find_sequences
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +19,7 @@ def script():
 def test_log_of_a_cityscapes_tree_is_read_whole(script, tmp_path):
     tree = Tree(tmp_path / "src", gt_fine=True)
     names = tree.write(range(30))
-    (sequence,) = find_sequences(tree.root)
+    sequence = only(tree)
     write_log(sequence.recording(), tmp_path / "log.mcap")
     found = read(script, tmp_path / "log.mcap")
     assert found["done"]

@@ -10,8 +10,9 @@ from support.driving import CALIBRATION, FRAME_NS, START_NS, driving
 
 from semgrid_eval.classes import CLASS_NAMES, label_palette
 from semgrid_eval.errors import InputError, LogError
-from semgrid_eval.log.scene import Scene
-from semgrid_eval.log.store import LogReader, find_logs, write_log
+from semgrid_eval.log.codec import Scene
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import find_logs, write_log
 from semgrid_eval.recording.png import decode_gray, read_header, with_palette
 
 

@@ -10,7 +10,8 @@ from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.codec import stamp_ns
-from semgrid_eval.log.store import LogReader, write_log
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import write_log
 from semgrid_eval.log.topics import TRANSFORMS
 from semgrid_eval.playback.backdrop import Backdrop
 from semgrid_eval.sensors.camera import CameraSensor

@@ -16,7 +16,8 @@ from support.toy_world import FRAME_NS, street
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.log.codec import stamp_ns
-from semgrid_eval.log.store import LogReader, write_log
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import write_log
 from semgrid_eval.playback.write import GAP_NS, write_playback
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix

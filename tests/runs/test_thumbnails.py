@@ -15,7 +15,8 @@ from semgrid_eval.executors import InProcess, Processes
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.log.store import LogReader, write_log
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.png import decode_ids
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix

@@ -14,7 +14,8 @@ from support.onnx_models import FLAT, colour_network
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.log.convert import Work
-from semgrid_eval.log.store import LogReader, find_logs, read_recording, write_log
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import find_logs, read_recording, write_log
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.relabel import RECORD, segment_logs
@@ -73,7 +74,7 @@ def test_all_else_is_kept(logs, model, tmp_path):
 def test_log_says_what_made_its_labels(logs, model, tmp_path):
     segment([logs], model)
     with LogReader(logs / "val/a.mcap") as source, LogReader(tmp_path / "labelled/val/a.mcap") as log:
-        record = json.loads(log.source_files()[RECORD])
+        record = json.loads(log.attachments()[RECORD])
         assert record["log_digest"] == source.digest
         assert log.scene.source_digest != source.scene.source_digest
     assert record["model"] == "network.onnx"

@@ -5,7 +5,8 @@ from support.toy_world import Mount, street
 
 from semgrid_eval.classes import NO_POINT, class_map
 from semgrid_eval.errors import LogError
-from semgrid_eval.log.store import LogReader, write_log
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import write_log
 from semgrid_eval.motion import EgoMotion
 from semgrid_eval.recording import png
 from semgrid_eval.sensors.camera import CameraSensor, frame_poses, read_cameras

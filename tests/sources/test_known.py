@@ -16,9 +16,9 @@ from semgrid_eval.cli.main import cli
 from semgrid_eval.config import Config
 from semgrid_eval.errors import MissingExtraError
 from semgrid_eval.log.convert import convert_recordings
-from semgrid_eval.log.store import LogReader, find_logs
-from semgrid_eval.sources.known import SOURCES, Known, load_source
-from semgrid_eval.sources.source import Source
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import find_logs
+from semgrid_eval.sources.known import SOURCES, Known, Source, load_source
 
 
 class BagOptions(Config):

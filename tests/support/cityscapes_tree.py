@@ -12,7 +12,7 @@ import pytest
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.recording.png import encode_gray
-from semgrid_eval.sources.cityscapes.tree import find_sequences
+from semgrid_eval.sources.cityscapes.tree import CityscapesOptions, find_sequences
 
 FRAME_NS = 58_823_529
 CAMERA = {
@@ -102,9 +102,14 @@ def change_json(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
     put_json(path, value)
 
 
+def sequences(tree, **options):
+    """Find the sequences of a tree."""
+    return find_sequences(CityscapesOptions(src=tree.root, **options))
+
+
 def only(tree, **options):
     """Find the only sequence of a tree."""
-    (sequence,) = find_sequences(tree.root, **options)
+    (sequence,) = sequences(tree, **options)
     return sequence
 
 

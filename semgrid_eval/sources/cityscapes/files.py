@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_eval.classes import CITYSCAPES_LABELS, label_ids_from_train_ids
 from semgrid_eval.errors import InputError
@@ -86,15 +85,13 @@ def read_label(path: Path, *, train_ids: bool) -> tuple[bytes, PngHeader]:
     if header.bit_depth == 8 and header.colour_type in (GRAY, PALETTE) and not train_ids:
         return data, header
     ids = decode_ids(data, path)
-    return encode_gray(_label_ids(ids, path) if train_ids else ids), header
-
-
-def _label_ids(train_ids: NDArray[np.uint8], path: Path) -> NDArray[np.uint8]:
-    known = [label.train_id for label in CITYSCAPES_LABELS]  # 255, which stands for none, among them
-    strange = np.setdiff1d(train_ids, known)
-    if len(strange):
-        raise InputError(f"holds {strange[0]}, which is not a train id; are these label ids?", path=path)
-    return label_ids_from_train_ids()[train_ids]
+    if train_ids:
+        known = [label.train_id for label in CITYSCAPES_LABELS]  # 255, which stands for none, among them
+        strange = np.setdiff1d(ids, known)
+        if len(strange):
+            raise InputError(f"holds {strange[0]}, which is not a train id; are these label ids?", path=path)
+        ids = label_ids_from_train_ids()[ids]
+    return encode_gray(ids), header
 
 
 def _read_object(path: Path) -> dict[str, Any]:

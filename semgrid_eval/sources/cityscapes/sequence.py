@@ -37,7 +37,7 @@ class SequenceFrame:
 
 @dataclass(frozen=True)
 class CityscapesSequence:
-    """One recording of a Cityscapes tree, found but not read yet."""
+    """One recording of a Cityscapes tree, found but not read yet; its faults are InputErrors that name a file."""
 
     name: str  # that of its first frame
     split: str  # the folder that it is in
@@ -48,19 +48,11 @@ class CityscapesSequence:
     train_ids: bool  # whether label images hold train ids instead of label ids
 
     def digest(self) -> str:
-        """Digest the bytes of all files and the options; computed once.
-
-        Raises:
-            InputError: a file is missing or cannot be read.
-        """
+        """Digest the bytes of all files and the options; computed once."""
         return self._digest
 
     def recording(self) -> Recording:
-        """Return the recording; it reads its pictures only while it is streamed.
-
-        Raises:
-            InputError: a frame is lost, a file is missing, or calibration or time stamps are at fault.
-        """
+        """Return the recording; it reads its pictures only while it is streamed."""
         digest = self.digest()
         stamps_ns = self._stamps_ns()
         return Recording(

@@ -24,50 +24,64 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Annotated
 
+from pydantic import Field
+
+from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
+from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.sources.cityscapes.sequence import CityscapesSequence, SequenceFrame, frame_name, sibling
+from semgrid_eval.sources.known import Source
 
 RECORDING_FRAMES = 30
 CAMERA_NAME = "front"
 _IMAGES = "leftImg8bit_sequence"
 _CAMERA_NAME = re.compile(r"[A-Za-z0-9_-]+")
 _IMAGE_NAME = re.compile(r"(?P<sequence>.+_[0-9]+)_(?P<number>[0-9]+)_leftImg8bit\.png")
+_LABELS = "Folder of label images whose names begin with the frame's, anywhere below it; else gtFine is used."
+_HELP = """Convert the Cityscapes sequence tree SRC to logs OUT/<split>/<city>_<sequence>_<first frame>.mcap.
+
+SRC holds leftImg8bit_sequence, disparity_sequence, vehicle_sequence, timestamp_sequence and camera (for each frame
+or one of a sequence). Where frame numbers break off inside a stretch of 30 a frame is lost, elsewhere another log
+begins.
+
+A recording fails as a whole, named with the file at fault, if a frame is lost, a file is missing, broken or
+impossible, camera files differ, time stamps do not grow, or a picture has another size or bit depth: windows count
+frames, so none may be dropped. Frames without a label image are allowed. The other recordings are converted; the
+exit code is then 1. Logs whose inputs have not changed are left as they are.
+"""
 
 
-def find_sequences(
-    src: Path,
-    *,
-    splits: Collection[str] = (),
-    labels: Path | None = None,
-    train_ids: bool = False,
-    camera_name: str = CAMERA_NAME,
-) -> list[CityscapesSequence]:
-    """List the recordings of a tree, sorted by split and name, without reading any file.
+class CityscapesOptions(Config):
+    """Which recordings of which tree, and how its label images are to be read."""
 
-    Args:
-        src: the folder that holds leftImg8bit_sequence.
-        splits: only these; all where none is named.
-        labels: a folder of label images, anywhere below it, whose names begin with the frame's; None takes gtFine.
-        train_ids: whether label images hold train ids instead of label ids.
-        camera_name: what the camera shall be called.
+    src: Path
+    labels: Annotated[Path | None, Field(description=_LABELS)] = None
+    train_ids: Annotated[bool, Field(description="Label images hold train ids instead of label ids.")] = False
+    split: Annotated[tuple[str, ...], Field(description="Only this split; may be given several times.")] = ()
+    camera_name: Annotated[str, Field(description="Name of the camera in the logs.")] = CAMERA_NAME
+
+
+def find_sequences(options: CityscapesOptions) -> list[CityscapesSequence]:
+    """List the chosen recordings of a tree, sorted by split and name, without reading any file.
 
     Raises:
         InputError: there is no such folder or split, no sequence in it, a label image's name says the other kind of
             ids, or the camera cannot be called so.
     """
-    if not _CAMERA_NAME.fullmatch(camera_name):
-        raise InputError(f"{camera_name!r} is not a name of letters, digits, _ and -", field="camera name")
-    root = src / _IMAGES
+    if not _CAMERA_NAME.fullmatch(options.camera_name):
+        raise InputError(f"{options.camera_name!r} is not a name of letters, digits, _ and -", field="camera name")
+    root, labels = options.src / _IMAGES, options.labels
     if not root.is_dir():
         raise InputError("is not a folder; a Cityscapes sequence tree has one", path=root)
     if labels is not None and not labels.is_dir():
         raise InputError("is not a folder of label images", path=labels)
     pattern = "*/[!.]*_leftImg8bit.png"
-    images = [image for split in _splits(root, splits) for image in sorted((root / split).glob(pattern))]
+    images = [image for split in _splits(root, options.split) for image in sorted((root / split).glob(pattern))]
     runs = list(_runs(images))
-    label_files = _LabelFiles(labels, images, train_ids=train_ids)
-    sequences = [_sequence(run, label_files, train_ids=train_ids, camera_name=camera_name) for run in runs]
+    label_files = _LabelFiles(labels, images, train_ids=options.train_ids)
+    sequences = [_sequence(run, label_files, options) for run in runs]
     if not sequences:
         raise InputError("holds no <split>/<city>/<city>_<sequence>_<number>_leftImg8bit.png", path=root)
     return sorted(sequences, key=lambda sequence: (sequence.split, sequence.name))
@@ -109,17 +123,17 @@ def recording_starts(numbers: Sequence[int]) -> list[int]:
 
 
 def _sequence(
-    run: list[tuple[int, Path]], label_files: "_LabelFiles", *, train_ids: bool, camera_name: str
+    run: list[tuple[int, Path]], label_files: "_LabelFiles", options: CityscapesOptions
 ) -> CityscapesSequence:
     first = run[0][1]
     return CityscapesSequence(
         name=frame_name(first),
         split=first.parent.parent.name,
         city=first.parent.name,
-        camera_name=camera_name,
+        camera_name=options.camera_name,
         frames=tuple(_frame(image, label_files) for _, image in run),
         lost=_lost_image(run),
-        train_ids=train_ids,
+        train_ids=options.train_ids,
     )
 
 
@@ -176,3 +190,21 @@ class _LabelFiles:
             if path.stem.lower().endswith(self._other):
                 raise InputError(f"is named as {self._advice}", path=path)
         return exact or found
+
+
+def convert_cityscapes(options: CityscapesOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
+    """Write the logs of a sequence tree; those that are up to date stay as they are.
+
+    Raises:
+        InputError: the tree or an option cannot be used, or the disk is full.
+    """
+    jobs = [ConversionJob(s.name, s.split, s.digest, s.recording) for s in find_sequences(options)]
+    return convert_jobs(jobs, out, work)
+
+
+SOURCE = Source(
+    options=CityscapesOptions,
+    convert=convert_cityscapes,
+    help=_HELP,
+    example="semgrid-eval convert cityscapes cityscapes logs --labels predictions --split val",
+)

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 import semgrid_eval
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
-from semgrid_eval.sources.town.road_users import ROAD_USERS, Shape
 from semgrid_eval.sources.town.solids import BOX, Texture, colours
-from semgrid_eval.sources.town.traffic import Snapshot
+from semgrid_eval.sources.town.traffic import ROAD_USERS, Shape, Snapshot
 
 _COLOURS = ("main", "second", "dark", "glass", "skin", "red")
 _OWN = 0  # the label of the actor itself

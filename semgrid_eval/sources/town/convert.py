@@ -1,12 +1,24 @@
-"""The simulated town as logs."""
+"""The simulated town as logs: any, or a frozen data set, which is compared with what is published."""
 
+import platform
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from typing import Annotated
 
+from pydantic import Field
+
+from semgrid_eval.config import Config
+from semgrid_eval.executors import local_executor
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
-from semgrid_eval.sources.source import Source
+from semgrid_eval.log.fingerprint import fingerprints
+from semgrid_eval.log.store import SUFFIX
+from semgrid_eval.packages import installed_versions
+from semgrid_eval.sources.benchmarks import Benchmark, Comparison, SizeName, compare, load_benchmark
+from semgrid_eval.sources.known import Source
 from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
-from semgrid_eval.sources.town.rendering import render_recording
+from semgrid_eval.sources.town.rendering import RENDER_VERSION, render_recording
+from semgrid_eval.sources.town.town import TOWN_VERSION
 
 CACHE = ".towns"
 KEPT = f"Folder of towns.  [default: OUT/{CACHE}]"
@@ -16,6 +28,13 @@ Traffic comes from Eclipse SUMO, pictures from ray casting with Embree; exact la
 and all road users with their velocities are on topics of their own. Training and validation have different towns.
 Logs that are up to date are left as they are, so that the same command goes on after a stop.
 """
+_PACKAGES = ("numpy", "opencv-python-headless", "eclipse-sumo", "embreex")
+_TOWN_V1_HELP = """Make the frozen data set town-v1 of the simulated town, which is the same everywhere.
+
+It has 300 recordings for training and 120 for validation, or 2,975 and 500 with --size full. The last line says whether
+every recording is the published one. Logs that are up to date are left as they are, so that the same command goes on
+after a stop.
+"""
 
 
 def convert_town(
@@ -24,10 +43,6 @@ def convert_town(
     """Simulate towns, draw recordings from them and write their logs; what is there already is kept.
 
     Towns are kept in the cache of `work`; the logs carry the name `dataset`.
-
-    Raises:
-        InputError: SUMO failed, or a folder cannot be written to.
-        MissingExtraError: SUMO or Embree is not installed.
     """
     with work.stage("simulate") as progress:
         cache = work.cache or out / CACHE
@@ -41,5 +56,80 @@ SOURCE = Source(
     convert=convert_town,
     help=_HELP,
     example="semgrid-eval convert synthetic logs --recordings 2 --towns 2 --town-size-m 250 --duration-s 15",
+    cache=KEPT,
+)
+
+
+class SizeOptions(Config):
+    """Which size of a benchmark."""
+
+    size: Annotated[SizeName, Field(description="Full is as large as the paper's data.")] = "small"
+
+
+def convert_town_v1(options: SizeOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
+    """Write the logs of town-v1 and, if none failed, compare them with the published ones."""
+    benchmark, size = load_benchmark("town-v1"), options.size
+    summary = convert_town(config_of(benchmark, size), out, work, dataset=benchmark.dataset(size))
+    summary.all_splits = True
+    comparison = None
+    if not summary.failed:
+        labels = sorted(summary.labels)
+        logs = [out / f"{label}{SUFFIX}" for label in labels]
+        with work.stage("compare") as progress:
+            found = fingerprints(logs, executor=local_executor(work.workers), progress=progress)
+        comparison = compare(benchmark.sizes[size], dict(zip(labels, found, strict=True)))
+    made_with = benchmark.sizes[size].versions
+    summary.remark = _verdict(f"{benchmark.name} {size}", comparison, len(summary.labels), made_with)
+    return summary
+
+
+def config_of(benchmark: Benchmark, size: SizeName) -> SyntheticConfig:
+    """Return what `plan_recordings` needs for one size of a benchmark."""
+    chosen = benchmark.sizes[size]
+    recordings = chosen.train.recordings + chosen.val.recordings
+    same = {name: getattr(benchmark, name) for name in ("width", "height", "stereo", "town_size_m", "duration_s")}
+    return SyntheticConfig(
+        recordings=recordings,
+        seed=chosen.seed,
+        towns=chosen.train.towns + chosen.val.towns,
+        val_share=chosen.val.recordings / recordings,
+        val_towns=chosen.val.towns,
+        **same,
+    )
+
+
+def changed_versions(made_with: Mapping[str, str]) -> dict[str, tuple[str, str | None]]:
+    """Return what published recordings were made with and what is here instead, None where nothing is."""
+    here = versions()
+    return {what: (theirs, here.get(what)) for what, theirs in made_with.items() if here.get(what) != theirs}
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what the bytes of a recording depend on, and the processor's kind."""
+    own = {"processor": platform.machine(), "town builder": str(TOWN_VERSION), "renderer": str(RENDER_VERSION)}
+    return dict(sorted((own | installed_versions(_PACKAGES)).items()))
+
+
+def _verdict(name: str, comparison: Comparison | None, total: int, made_with: Mapping[str, str]) -> str:
+    """Say in one line whether the recordings are the published ones."""
+    if comparison is None:
+        return f"Warning: {name}: not compared with what is published, since recordings failed"
+    if comparison.published is None:
+        return f"{name}: digest {comparison.digest}; nothing is published yet to compare it with"
+    if comparison.digest == comparison.published:
+        return f"{name}: digest {comparison.digest}, as published"
+    others = ", ".join(f"{what} {theirs} (here {ours})" for what, (theirs, ours) in changed_versions(made_with).items())
+    why = f"published were made with {others}" if others else "the versions are the same, so processors differ"
+    return (
+        f"Warning: {name}: {len(comparison.differing)} of {total} recordings differ from the published ones, such as "
+        f"{comparison.differing[0]}; digest {comparison.digest}, published {comparison.published}; {why}"
+    )
+
+
+TOWN_V1 = Source(
+    options=SizeOptions,
+    convert=convert_town_v1,
+    help=_TOWN_V1_HELP,
+    example="semgrid-eval convert town-v1 logs --size small",
     cache=KEPT,
 )

@@ -9,8 +9,7 @@ from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.sources.town.ground import CELL_M, Ground, Surface
 from semgrid_eval.sources.town.kinds import TownKind
 from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline
-from semgrid_eval.sources.town.solids import BoxRow, Look, Texture, box, colours
-from semgrid_eval.sources.town.trees import Tree, draw_bush, draw_tree
+from semgrid_eval.sources.town.solids import BoxRow, Look, Texture, Tree, box, colours, draw_bush, draw_tree
 
 _BUILDING, _WALL, _FENCE, _HEDGE = (LABEL_ID[name] for name in ("building", "wall", "fence", "vegetation"))
 _FLOOR_M = 3.1

@@ -5,9 +5,8 @@ import numpy as np
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.sources.town.kinds import TownKind
 from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline
-from semgrid_eval.sources.town.road_users import CAR_TYPES, ROAD_USERS
-from semgrid_eval.sources.town.solids import BoxRow, Texture, box
-from semgrid_eval.sources.town.trees import Tree, draw_tree
+from semgrid_eval.sources.town.solids import BoxRow, Texture, Tree, box, draw_tree
+from semgrid_eval.sources.town.traffic import CAR_TYPES, ROAD_USERS
 
 ParkedCar = tuple[int, float, float, float]  # type index, x, y, yaw
 _POLE, _SIGN, _LIGHT = LABEL_ID["pole"], LABEL_ID["traffic sign"], LABEL_ID["traffic light"]

@@ -18,20 +18,8 @@ MARGIN_M = 120.0
 _SHIFT_BITS = 4
 _DASH_M, _GAP_M = 3.0, 5.0
 _STRIPE_M, _STRIPE_PERIOD_M = 0.4, 1.2
-
-
-class Surface(IntEnum):
-    """What the ground is made of."""
-
-    TERRAIN = 0
-    ROAD = 1
-    MARKING = 2
-    SIDEWALK = 3
-    CROSSING = 4
-    BICYCLE_LANE = 5
-    PARKING = 6
-
-
+Surface = IntEnum("Surface", "TERRAIN ROAD MARKING SIDEWALK CROSSING BICYCLE_LANE PARKING", start=0)
+"""What the ground is made of."""
 _LOOKS = {
     Surface.TERRAIN: ("terrain", (92, 108, 62)),
     Surface.ROAD: ("road", (92, 92, 94)),

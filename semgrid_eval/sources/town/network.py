@@ -14,15 +14,8 @@ from semgrid_eval.geometry import Floats
 _DEFAULT_WIDTH_M = 3.2
 
 
-class LaneUse(Enum):
-    """Whom a lane is for; a lane that nobody may drive on is the parking strip."""
-
-    SIDEWALK = "sidewalk"
-    PARKING = "parking"
-    BICYCLE = "bicycle"
-    CAR = "car"
-
-
+LaneUse = Enum("LaneUse", "SIDEWALK PARKING BICYCLE CAR")
+"""Whom a lane is for; a lane that nobody may drive on is the parking strip."""
 _USES = {"pedestrian": LaneUse.SIDEWALK, "bicycle": LaneUse.BICYCLE}
 
 
@@ -93,11 +86,7 @@ class Network:
 
 
 def read_network(path: Path) -> Network:
-    """Read a `.net.xml` file.
-
-    Raises:
-        InputError: the town has no street.
-    """
+    """Read a `.net.xml` file, which must have a street."""
     root = ET.parse(path).getroot()
     junctions = [node for node in root.iter("junction") if node.get("type") != "internal" and node.get("shape")]
     lights = {node.attrib["id"] for node in junctions if node.get("type") == "traffic_light"}

@@ -64,18 +64,9 @@ class SyntheticConfig(Config):
 def plan_recordings(
     config: SyntheticConfig, cache_dir: Path, progress: Progress, *, workers: int = 1, dataset: str = "synthetic"
 ) -> list[RecordingPlan]:
-    """Simulate the towns that the cache does not hold yet, and choose the windows of all recordings.
+    """Simulate the towns that the cache does not hold yet, some at a time, and choose the windows of all recordings.
 
-    Args:
-        config: of the data set.
-        cache_dir: where towns are kept.
-        progress: called for each finished town.
-        workers: towns simulated at the same time.
-        dataset: the name that the logs carry.
-
-    Raises:
-        InputError: SUMO failed, the cache cannot be written to, or a town's traffic holds too few windows.
-        MissingExtraError: SUMO or Embree is not installed.
+    Progress is called for each finished town. A town whose traffic holds too few windows is an InputError.
     """
     if importlib.util.find_spec("embreex") is None:  # otherwise first noticed minutes later, when rendering begins
         raise MissingExtraError("synthetic", "embreex")

@@ -1,7 +1,7 @@
-"""Renders one recording frame by frame: what the cameras see, what the vehicle reports, and the truth."""
+"""Renders one recording frame by frame: who is on stage, what the cameras see, what the vehicle reports, the truth."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -12,21 +12,68 @@ from numpy.typing import NDArray
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.recording.types import Actor, Moment, MotionSample, Pose, Recording
-from semgrid_eval.sources.town import motion
-from semgrid_eval.sources.town.bodies import actor_ids, heights_m
-from semgrid_eval.sources.town.drives import FRAME_COUNT, FRAME_RATE_HZ, Drive, ego_path
+from semgrid_eval.sources.town import drives
+from semgrid_eval.sources.town.bodies import actor_ids, boxes_of, heights_m
 from semgrid_eval.sources.town.rig import Rig
-from semgrid_eval.sources.town.road_users import ROAD_USERS
-from semgrid_eval.sources.town.sensors import Camera, cityscapes_camera
-from semgrid_eval.sources.town.shading import draw_sunlight
-from semgrid_eval.sources.town.stage import Stage
-from semgrid_eval.sources.town.town import load_town
-from semgrid_eval.sources.town.traffic import Snapshot
+from semgrid_eval.sources.town.sensors import Camera, RayCaster, View, cityscapes_camera, look
+from semgrid_eval.sources.town.shading import Painter, Sunlight, draw_sunlight
+from semgrid_eval.sources.town.solids import Soup, soup_of_boxes
+from semgrid_eval.sources.town.town import Town, load_town
+from semgrid_eval.sources.town.traffic import ROAD_USERS, Snapshot
 
+_SIGHT_M = 160.0
+_BEHIND_M, _ASIDE_M, _WIDENING = 9.0, 9.0, 0.55  # includes what throws shadows into the picture
 CAMERA_NAME = "front"
 RENDER_VERSION = 2
 """Counts changes to what a plan renders to; logs of another version are rendered again."""
 STAMP_JITTER_S = 0.001
+
+
+class Stage:
+    """A town around the place where a recording begins; what stands still is prepared once.
+
+    Its frame is the map frame with the origin moved to that place.
+    """
+
+    def __init__(self, town: Town, cameras: Sequence[Camera], sunlight: Sunlight, place_m: tuple[float, float]) -> None:
+        self._place_m = place_m
+        self._ground = town.scene.ground
+        self._traffic = town.traffic
+        corners = town.scene.soup.triangles_m[:, 0, :2]
+        near = np.linalg.norm(corners - np.array(place_m, np.float32), axis=1) < _SIGHT_M
+        self._still = town.scene.soup.where(near).moved(-place_m[0], -place_m[1])
+        self._still_caster = RayCaster(self._still.triangles_m)
+        self._painters = [(camera, Painter(camera, sunlight, self._still)) for camera in cameras]
+        self.parked = town.scene.parked.where(_is_near(town.scene.parked, *place_m))
+
+    def others(self, time_s: float, pose: Pose, ego: int) -> Snapshot:
+        """Return the road users near the ego vehicle, itself left out."""
+        moving = self._traffic.at(time_s)
+        return moving.where(_is_near(moving, pose.x_m, pose.y_m) & (moving.actor != ego))
+
+    def pictures(self, others: Snapshot, time_s: float, pose: Pose) -> list[tuple[View, NDArray[np.uint8]]]:
+        """Return what each camera sees from a pose of the vehicle, and its colour image (H, W, 3)."""
+        boxes = boxes_of(_in_sight(others, pose), time_s)
+        movers = soup_of_boxes(boxes).moved(-self._place_m[0], -self._place_m[1])
+        casters = (self._still_caster, RayCaster(movers.triangles_m))
+        soup = Soup.joined([self._still, movers])
+        pictures = []
+        for camera, painter in self._painters:
+            view = look(camera, pose, casters, soup, self._ground, self._place_m)
+            pictures.append((view, painter.paint(view, casters, movers)))
+        return pictures
+
+
+def _is_near(actors: Snapshot, x_m: float, y_m: float) -> NDArray[np.bool_]:
+    return np.asarray(np.linalg.norm(actors.centre_m - (x_m, y_m), axis=1) < _SIGHT_M)
+
+
+def _in_sight(actors: Snapshot, pose: Pose) -> Snapshot:
+    """Return the actors that may be seen or throw a shadow that is seen."""
+    away = actors.centre_m - (pose.x_m, pose.y_m)
+    ahead_m = away @ (np.cos(pose.yaw_rad), np.sin(pose.yaw_rad))
+    left_m = away @ (-np.sin(pose.yaw_rad), np.cos(pose.yaw_rad))
+    return actors.where((ahead_m > -_BEHIND_M) & (np.abs(left_m) < _ASIDE_M + _WIDENING * np.maximum(ahead_m, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -37,7 +84,7 @@ class RecordingPlan:
     split: str  # `train` or `val`
     town: Path  # folder of the town
     town_digest: str  # of the town's specification
-    drive: Drive  # which car, from when
+    drive: drives.Drive  # which car, from when
     seed: tuple[int, ...]  # of the recording's random numbers
     width_px: int  # of the images
     height_px: int  # of the images
@@ -57,12 +104,7 @@ class RecordingPlan:
 
 
 def render_recording(plan: RecordingPlan) -> Recording:
-    """Return the recording of a plan; frames are rendered one by one as they are asked for.
-
-    Raises:
-        InputError: the town's folder is gone or damaged.
-        MissingExtraError: Embree is not installed.
-    """
+    """Return the recording of a plan; frames are rendered one by one as they are asked for."""
     calibration = cityscapes_camera(plan.width_px, plan.height_px)
     description = json.dumps(plan.description(), indent=2, sort_keys=True) + "\n"
     return Recording(
@@ -79,13 +121,13 @@ def render_recording(plan: RecordingPlan) -> Recording:
 
 def _moments(plan: RecordingPlan) -> Iterator[Moment]:
     town = load_town(plan.town)
-    path = ego_path(town.traffic, plan.drive)
+    path = drives.ego_path(town.traffic, plan.drive)
     assert path is not None, "a plan's drive was checked when it was chosen"
     stamps, reports, light, errors = np.random.default_rng(plan.seed).spawn(4)
-    times_s = plan.drive.start_s + np.arange(FRAME_COUNT) / FRAME_RATE_HZ
-    times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, FRAME_COUNT - 1))
-    motion_noise = motion.EXACT_MOTION if plan.stereo == "exact" else motion.MotionNoise()
-    reported = motion.report(path, times_s, motion_noise, reports)
+    times_s = plan.drive.start_s + np.arange(drives.FRAME_COUNT) / drives.FRAME_RATE_HZ
+    times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, drives.FRAME_COUNT - 1))
+    motion_noise = drives.EXACT_MOTION if plan.stereo == "exact" else drives.MotionNoise()
+    reported = drives.report(path, times_s, motion_noise, reports)
     camera = Camera(cityscapes_camera(plan.width_px, plan.height_px), plan.width_px, plan.height_px)
     rig = Rig(camera, plan.stereo, errors)
     stage = Stage(town, rig.cameras, draw_sunlight(light), path.at(float(times_s[0]))[:2])
@@ -104,14 +146,13 @@ def _rounded(values: NDArray[np.float64]) -> Any:  # noqa: ANN401 - floats, in l
 
 
 def _actors(group: Snapshot) -> list[Actor]:
-    columns = np.column_stack(
-        [group.centre_m, group.yaw_rad, heights_m(group.actor, group.type_index), group.velocity_mps]
-    )
+    height_m = heights_m(group.actor, group.type_index)
+    columns = np.column_stack([group.centre_m, group.yaw_rad, height_m, group.velocity_mps])
     found = []
     ids = actor_ids(group).tolist()
     for actor_id, type_index, values in zip(ids, group.type_index, _rounded(columns), strict=True):
         user = ROAD_USERS[type_index]
-        x_m, y_m, yaw_rad, height_m, velocity_x, velocity_y = values
-        size_m = (user.length_m, user.width_m, height_m)
+        x_m, y_m, yaw_rad, high_m, velocity_x, velocity_y = values
+        size_m = (user.length_m, user.width_m, high_m)
         found.append(Actor(actor_id, user.label_id, x_m, y_m, yaw_rad, *size_m, velocity_x, velocity_y))
     return found

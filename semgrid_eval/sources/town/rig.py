@@ -1,21 +1,74 @@
 """The camera of a recording: what it sees becomes the files of a frame, with the errors that were asked for."""
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.recording.types import CameraFrame
-from semgrid_eval.sources.town.matching import StereoMatcher
 from semgrid_eval.sources.town.noise import DisparityErrors, DisparityNoise, LabelErrors, LabelNoise
 from semgrid_eval.sources.town.sensors import Camera, View
 
+NEAREST_M = 3.0
+"""What is nearer than this is not matched."""
+_BLOCK_PX = 5
+_SUBPIXELS = 16
+_SENSOR_NOISE = 2.0  # standard deviation in grey levels; without it even a clear sky would match
 # Speed counts more than size here. OpenCV before 4.12 has no choice of filter and ignores it.
 _FILTER, _NO_FILTER, _FILTER_UP = 19, 8, 32
 _PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY]
 _COLOUR_PNG = [*_PNG, 0, _FILTER, _NO_FILTER]
 _GREY_PNG = [*_PNG, cv2.IMWRITE_PNG_STRATEGY_RLE, _FILTER, _FILTER_UP]
+
+
+class StereoMatcher:
+    """OpenCV's semi-global matching along three paths, for the pairs of one camera.
+
+    Matching cannot see what lies left of the right image's edge, so pairs are rendered `margin_px` wider on the left,
+    which the result leaves out again.
+    """
+
+    def __init__(self, camera: Camera, rng: np.random.Generator) -> None:
+        self._rng = rng
+        farthest_px = camera.calibration.fx_px * camera.calibration.baseline_m / NEAREST_M
+        self.margin_px = 16 * math.ceil(farthest_px / 16)
+        wider = replace(camera.calibration, u0_px=camera.calibration.u0_px + self.margin_px)
+        left = Camera(wider, camera.width_px + self.margin_px, camera.height_px)
+        self.cameras = (left, right_of(left))
+        self._matching = cv2.StereoSGBM.create(
+            minDisparity=0,
+            numDisparities=self.margin_px,
+            blockSize=_BLOCK_PX,
+            P1=8 * _BLOCK_PX**2,
+            P2=32 * _BLOCK_PX**2,
+            disp12MaxDiff=1,
+            uniquenessRatio=8,
+            speckleWindowSize=60,
+            speckleRange=2,
+            mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+        )
+
+    def disparity_px(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Match two colour images (H, margin + W, 3) and return the disparity (H, W); 0 where there is none."""
+        grey = [self._exposed(image) for image in (left, right)]
+        found = self._matching.compute(*grey)[:, self.margin_px :]
+        return np.maximum(found, 0).astype(np.float32) / np.float32(_SUBPIXELS)
+
+    def _exposed(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the grey image (H, W) of a sensor with noise of its own."""
+        grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
+        grey += np.float32(_SENSOR_NOISE) * self._rng.standard_normal(grey.shape, np.float32)
+        return np.clip(grey, 0, 255).astype(np.uint8)
+
+
+def right_of(camera: Camera) -> Camera:
+    """Return the right camera of the pair whose left one this is."""
+    left = camera.calibration
+    x_m, y_m, z_m = left.ego_from_optical.apply(np.array([left.baseline_m, 0.0, 0.0]))
+    return replace(camera, calibration=replace(left, x_m=float(x_m), y_m=float(y_m), z_m=float(z_m)))
 
 
 class Rig:

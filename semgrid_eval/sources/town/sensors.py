@@ -91,11 +91,7 @@ class RayCaster:
     """Triangles that rays can be cast at."""
 
     def __init__(self, triangles_m: Float32s) -> None:
-        """Build Embree's tree over triangles (F, 3, 3).
-
-        Raises:
-            MissingExtraError: Embree is not installed.
-        """
+        """Build Embree's tree over triangles (F, 3, 3)."""
         try:
             from embreex.mesh_construction import TriangleMesh
             from embreex.rtcore_scene import EmbreeScene
@@ -152,13 +148,12 @@ def look(
     points_m += origin_m
     surface = ground.at(points_m[:, 0] + np.float32(stage_m[0]), points_m[:, 1] + np.float32(stage_m[1]))
     behind = np.where(np.isinf(camera.ground_depth_m), np.uint8(_SKY), SURFACE_LABELS[surface])
+    nobody = np.zeros(len(rays), np.uint16)
     return View(
         depth_m=np.where(is_open, camera.ground_depth_m, reached_m),
         points_m=points_m,
         label=np.where(is_open, behind, soup.label[triangle]) if len(soup) else behind,
-        instance=np.where(is_open, np.uint16(0), soup.instance[triangle])
-        if len(soup)
-        else np.zeros_like(behind, np.uint16),
+        instance=np.where(is_open, nobody, soup.instance[triangle]) if len(soup) else nobody,
         surface=surface,
         triangle=triangle,
     )

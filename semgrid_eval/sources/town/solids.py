@@ -1,4 +1,4 @@
-"""The two solids that everything in the town is made of, tapered boxes and tree crowns, turned into triangles."""
+"""The solids that everything in the town is made of, tapered boxes, trees and bushes, turned into triangles."""
 
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
@@ -8,20 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
 
-
-class Texture(IntEnum):
-    """How a surface is shaded."""
-
-    PLAIN = 0
-    FACADE = 1
-    ROOF = 2
-    FOLIAGE = 3
-    GLASS = 4
-    PLANKS = 5
-
-
+Texture = IntEnum("Texture", "PLAIN FACADE ROOF FOLIAGE GLASS PLANKS", start=0)
+"""How a surface is shaded."""
 _MEASURES = ("x_m", "y_m", "yaw_rad", "bottom_m", "top_m", "length_m", "width_m")
 _OF_TOP = ("top_length_m", "top_width_m", "top_shift_m")
 _LOOKS = [("label", "u1"), ("texture", "u1"), ("instance", "u2"), ("colour", "u1", (3,))]
@@ -35,6 +26,9 @@ BoxRow = tuple[float | Colour, ...]
 # Corners: bit 0 front, bit 1 left, bit 2 top. Faces turn counter-clockwise seen from outside.
 _FACES = "023 031 457 476 015 054 267 273 137 175 046 062"
 _BOX_FACES = np.array([[int(corner) for corner in face] for face in _FACES.split()])
+_VEGETATION = LABEL_ID["vegetation"]
+_BARK = (88, 72, 58)
+_LEAVES = np.array([(70, 98, 48), (88, 112, 54), (58, 84, 46), (104, 116, 60), (76, 92, 58)], np.uint8)
 
 
 def colours(hexadecimal: str) -> list[Colour]:
@@ -53,13 +47,8 @@ def box(
 ) -> BoxRow:
     """Return a row of `BOX`.
 
-    Args:
-        place: x, y of the base's centre and yaw.
-        heights_m: bottom and top.
-        size_m: length and width of the base.
-        look: Cityscapes label id, texture and sRGB colour.
-        top_size_m: length and width of the top where they differ.
-        instance: actor id, 0 where there is none.
+    The place is x, y of the base's centre and yaw; heights are bottom and top, sizes length and width of the base and,
+    where they differ, of the top; the instance is an actor's id, 0 where there is none.
     """
     label, texture, colour = look
     return (*place, *heights_m, *size_m, *(top_size_m or size_m), 0.0, label, texture, instance, colour)
@@ -166,3 +155,51 @@ def _icosphere() -> tuple[Floats, NDArray[np.int64]]:
 def _is_outward(points: Floats, face: tuple[int, int, int]) -> bool:
     first, second, third = points[list(face)]
     return bool(np.dot(np.cross(second - first, third - first), first) > 0.0)
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A tree or, without a trunk, a bush; its crown is an ellipsoid around `crown_m` above the ground."""
+
+    x_m: float
+    y_m: float
+    crown_m: float
+    radius_m: float
+    half_height_m: float
+    trunk_m: float  # diameter, 0 for a bush
+    colour: int
+
+
+def draw_tree(x_m: float, y_m: float, size: float, rng: np.random.Generator) -> Tree:
+    """Draw a tree around the given relative size; its crown begins above people's heads."""
+    scale = size * float(np.clip(rng.normal(1.0, 0.15), 0.6, 1.5))
+    half_height_m = scale * float(rng.uniform(1.8, 3.0))
+    bottom_m = float(rng.uniform(2.0, 3.2))
+    radius_m = scale * float(rng.uniform(1.5, 2.6))
+    colour = int(rng.integers(len(_LEAVES)))
+    return Tree(x_m, y_m, bottom_m + half_height_m, radius_m, half_height_m, 0.22 + 0.16 * scale, colour)
+
+
+def draw_bush(x_m: float, y_m: float, rng: np.random.Generator) -> Tree:
+    """Draw a bush that stands on the ground."""
+    radius_m = float(rng.uniform(0.5, 1.5))
+    half_height_m = radius_m * float(rng.uniform(0.7, 1.1))
+    return Tree(x_m, y_m, 0.8 * half_height_m, radius_m, half_height_m, 0.0, int(rng.integers(len(_LEAVES))))
+
+
+def soup_of_trees(trees: list[Tree], rng: np.random.Generator) -> Soup:
+    """Turn trees into triangles."""
+    look = (_VEGETATION, Texture.PLAIN, _BARK)
+    trunks = []
+    for tree in trees:
+        if tree.trunk_m > 0.0:
+            place, thick, thin = (tree.x_m, tree.y_m, 0.4), tree.trunk_m, 0.6 * tree.trunk_m
+            trunks.append(box(place, (0.0, tree.crown_m), (thick, thick), look, top_size_m=(thin, thin)))
+    crowns = soup_of_crowns(
+        np.array([(tree.x_m, tree.y_m, tree.crown_m) for tree in trees]).reshape(-1, 3),
+        np.array([(tree.radius_m, tree.half_height_m) for tree in trees]).reshape(-1, 2),
+        _VEGETATION,
+        _LEAVES[[tree.colour for tree in trees]].reshape(-1, 3),
+        rng,
+    )
+    return Soup.joined([soup_of_boxes(np.array(trunks, BOX)), crowns])

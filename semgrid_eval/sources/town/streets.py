@@ -8,7 +8,7 @@ import numpy as np
 
 from semgrid_eval.geometry import Floats
 from semgrid_eval.sources.town.kinds import TownKind
-from semgrid_eval.sources.town.sumo import run_binary
+from semgrid_eval.sources.town.simulation import run_binary
 
 SIDEWALK_WIDTH_M = 4.6  # narrower ones do not survive an opening of four cells of .78 m
 PARKING_WIDTH_M = 2.2
@@ -33,17 +33,17 @@ class _Street:
 
 
 def lay_out_streets(kind: TownKind, size_m: float, rng: np.random.Generator, folder: Path) -> Path:
-    """Write a SUMO network of about `size_m` x `size_m` into `folder` and return its path.
-
-    Raises:
-        InputError: a tool of SUMO failed.
-    """
+    """Write a SUMO network of about `size_m` x `size_m` into `folder` and return its path."""
     count = max(3, round(size_m / kind.block_m) + 1)
     spacing_m = size_m / (count - 1)
     seed = str(int(rng.integers(1 << 30)))
     grid = ["--grid", "--grid.number", str(count), "--grid.length", f"{spacing_m:.2f}"]
     run_binary("netgenerate", [*grid, "--seed", seed, "--plain-output-prefix", "grid"], folder)
-    positions = _displaced(_positions(folder / "grid.nod.xml"), kind, rng)
+    limit_m = 0.22 * kind.block_m
+    positions: Places = {}
+    for node in ET.parse(folder / "grid.nod.xml").getroot().iter("node"):
+        at = np.array([float(node.attrib["x"]), float(node.attrib["y"])])
+        positions[node.attrib["id"]] = at + np.clip(rng.normal(0.0, kind.jitter_m, 2), -limit_m, limit_m)
     _write_nodes(folder / "town.nod.xml", positions, kind, rng)
     _write_edges(folder / "town.edg.xml", folder / "grid.edg.xml", positions, kind, rng)
     options = ["-n", "town.nod.xml", "-e", "town.edg.xml", "-o", _NETWORK, "--seed", seed]
@@ -51,16 +51,6 @@ def lay_out_streets(kind: TownKind, size_m: float, rng: np.random.Generator, fol
     options += ["--junctions.corner-detail", "8", "--offset.disable-normalization"]
     run_binary("netconvert", options, folder)
     return folder / _NETWORK
-
-
-def _positions(path: Path) -> Places:
-    nodes = ET.parse(path).getroot().iter("node")
-    return {node.attrib["id"]: np.array([float(node.attrib["x"]), float(node.attrib["y"])]) for node in nodes}
-
-
-def _displaced(positions: Places, kind: TownKind, rng: np.random.Generator) -> Places:
-    limit_m = 0.22 * kind.block_m
-    return {name: at + np.clip(rng.normal(0.0, kind.jitter_m, 2), -limit_m, limit_m) for name, at in positions.items()}
 
 
 def _write_nodes(path: Path, positions: Places, kind: TownKind, rng: np.random.Generator) -> None:

@@ -1,15 +1,54 @@
-"""The traffic of a town over time: who is where at any moment, from arrays that can be mapped from disk."""
+"""The road users and their traffic over time: who is where at any moment, from arrays mapped from disk."""
 
 from dataclasses import dataclass, fields
+from enum import IntEnum
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
-from semgrid_eval.sources.town.road_users import ROAD_USERS, Shape
 
+Shape = IntEnum("Shape", "CAR VAN TRUCK BUS BICYCLE PERSON", start=0)
+"""How a road user looks; each has a model of its own."""
+_CAR, _TRUCK, _BUS = LABEL_ID["car"], LABEL_ID["truck"], LABEL_ID["bus"]
 _JUMP_M = 1.0  # nobody moves that far in one step of 59 ms; SUMO's pedestrians now and then do
+
+
+@dataclass(frozen=True)
+class RoadUser:
+    """A type of road user; SUMO gets its size, the scene its shape, the truth its label."""
+
+    name: str
+    sumo_class: str
+    shape: Shape
+    label_id: int
+    length_m: float
+    width_m: float
+    height_m: float
+    share: float  # among the types of its SUMO class
+
+
+ROAD_USERS = (
+    RoadUser("car_small", "passenger", Shape.CAR, _CAR, 3.9, 1.72, 1.48, 0.35),
+    RoadUser("car_family", "passenger", Shape.CAR, _CAR, 4.6, 1.82, 1.46, 0.35),
+    RoadUser("car_tall", "passenger", Shape.CAR, _CAR, 4.5, 1.85, 1.66, 0.18),
+    RoadUser("van", "passenger", Shape.VAN, _CAR, 5.0, 1.95, 1.98, 0.12),
+    RoadUser("truck_small", "truck", Shape.TRUCK, _TRUCK, 6.4, 2.2, 2.8, 0.5),
+    RoadUser("truck_large", "truck", Shape.TRUCK, _TRUCK, 8.6, 2.5, 3.4, 0.5),
+    RoadUser("bus", "bus", Shape.BUS, _BUS, 12.0, 2.55, 3.1, 1.0),
+    RoadUser("bicycle", "bicycle", Shape.BICYCLE, LABEL_ID["bicycle"], 1.75, 0.6, 1.75, 1.0),
+    RoadUser("person", "pedestrian", Shape.PERSON, LABEL_ID["person"], 0.4, 0.5, 1.75, 1.0),
+)
+CAR_TYPES = tuple(index for index, user in enumerate(ROAD_USERS) if user.sumo_class == "passenger")
+
+
+def type_index(name: str) -> int:
+    """Return the index in `ROAD_USERS` of the type with this name."""
+    return [user.name for user in ROAD_USERS].index(name)
+
+
 _LENGTHS_M = np.array([user.length_m for user in ROAD_USERS], np.float32)
 _IS_PERSON = np.array([user.shape is Shape.PERSON for user in ROAD_USERS])
 

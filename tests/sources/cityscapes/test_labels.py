@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from support.cityscapes_tree import Tree, fault, frames, only, put
+from support.cityscapes_tree import Tree, fault, frames, only, put, sequences
 
 from semgrid_eval.classes import label_ids_from_train_ids, label_palette
 from semgrid_eval.errors import InputError
 from semgrid_eval.recording.png import decode_ids, encode_gray, with_palette
-from semgrid_eval.sources.cityscapes.tree import find_sequences
 
 
 @pytest.fixture
@@ -70,7 +69,7 @@ def test_labels_whose_name_says_the_other_kind_are_refused(tree, tmp_path, kind,
     for each in (kind, *others):
         put(tmp_path / "labels" / f"{name}_{each}.png", tree.label(highest=18))
     with pytest.raises(InputError) as caught:
-        find_sequences(tree.root, labels=tmp_path / "labels", train_ids=train_ids)
+        sequences(tree, labels=tmp_path / "labels", train_ids=train_ids)
     assert str(caught.value) == f"{tmp_path / 'labels' / name}_{kind}.png: {expected}"
 
 

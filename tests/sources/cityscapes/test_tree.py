@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.cityscapes_tree import CAMERA, FRAME_NS, Tree, change_json, fault, frames, only, put
+from support.cityscapes_tree import CAMERA, FRAME_NS, Tree, change_json, fault, frames, only, put, sequences
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.recording.types import CameraCalibration, MotionSample
-from semgrid_eval.sources.cityscapes.tree import find_sequences, recording_starts
+from semgrid_eval.sources.cityscapes.tree import recording_starts
 
 
 @pytest.fixture
@@ -70,14 +70,14 @@ def test_recordings_can_be_streamed_again(tree):
 def test_sequences_of_all_splits_and_cities_come_sorted(tree):
     for split, city in (("val", "ulm"), ("train", "stuttgart_00"), ("test", "bonn"), ("train", "aachen")):
         Tree(tree.root, split=split, city=city).write(range(2))
-    found = [(sequence.split, sequence.name) for sequence in find_sequences(tree.root)]
+    found = [(sequence.split, sequence.name) for sequence in sequences(tree)]
     assert found == [
         ("test", "bonn_000000_000000"),
         ("train", "aachen_000000_000000"),
         ("train", "stuttgart_00_000000_000000"),
         ("val", "ulm_000000_000000"),
     ]
-    assert {sequence.split for sequence in find_sequences(tree.root, splits=["val", "test"])} == {"val", "test"}
+    assert {sequence.split for sequence in sequences(tree, split=("val", "test"))} == {"val", "test"}
 
 
 def test_files_whose_names_begin_with_a_dot_are_ignored(tree, tmp_path):
@@ -87,8 +87,8 @@ def test_files_whose_names_begin_with_a_dot_are_ignored(tree, tmp_path):
     plain, labelled = only(tree), only(tree, labels=tmp_path / "labels")
     for path in (*tree.root.rglob("*.*"), *(tmp_path / "labels").iterdir()):
         put(path.with_name(f"._{path.name}"), b"\0\5\x16\7")
-    assert find_sequences(tree.root) == [plain]
-    assert find_sequences(tree.root, labels=tmp_path / "labels") == [labelled]
+    assert sequences(tree) == [plain]
+    assert sequences(tree, labels=tmp_path / "labels") == [labelled]
 
 
 def test_gps_may_be_absent(tree):
@@ -158,8 +158,8 @@ def test_any_loss_inside_a_stretch_of_thirty_is_no_new_recording(stretches, lost
 
 def test_recordings_of_one_running_number_become_several_logs(tree):
     tree.write([*range(294, 324), *range(333, 363)])
-    assert [sequence.name[-6:] for sequence in find_sequences(tree.root)] == ["000294", "000333"]
-    assert [len(sequence.frames) for sequence in find_sequences(tree.root)] == [30, 30]
+    assert [sequence.name[-6:] for sequence in sequences(tree)] == ["000294", "000333"]
+    assert [len(sequence.frames) for sequence in sequences(tree)] == [30, 30]
 
 
 # The digest
@@ -310,14 +310,14 @@ def test_damaged_picture_is_named(tree):
 
 def test_tree_without_sequences_split_or_labels_is_refused(tree, tmp_path):
     with pytest.raises(InputError, match=r"src/leftImg8bit_sequence: is not a folder"):
-        find_sequences(tree.root)
+        sequences(tree)
     (tree.root / "leftImg8bit_sequence" / "val").mkdir(parents=True)
     with pytest.raises(InputError, match="holds no <split>/<city>/"):
-        find_sequences(tree.root)
+        sequences(tree)
     tree.write([0])
     with pytest.raises(InputError, match="train: is not a split of this tree; it has: val"):
-        find_sequences(tree.root, splits=["train"])
+        sequences(tree, split=("train",))
     with pytest.raises(InputError, match="labels: is not a folder of label images"):
-        find_sequences(tree.root, labels=tmp_path / "labels")
+        sequences(tree, labels=tmp_path / "labels")
     with pytest.raises(InputError, match="camera name: 'a/b' is not a name"):
-        find_sequences(tree.root, camera_name="a/b")
+        sequences(tree, camera_name="a/b")

@@ -3,9 +3,8 @@ import pytest
 
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.sources.town.bodies import boxes_of, heights_m
-from semgrid_eval.sources.town.road_users import ROAD_USERS, type_index
 from semgrid_eval.sources.town.solids import soup_of_boxes
-from semgrid_eval.sources.town.traffic import Snapshot
+from semgrid_eval.sources.town.traffic import ROAD_USERS, Snapshot, type_index
 
 
 def one(index: int, *, yaw_rad: float = 0.0, speed_mps: float = 0.0) -> Snapshot:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from semgrid_eval.sources.town.motion import EXACT_MOTION, FRONT_TO_REAR_AXLE_M, MotionNoise, drive, report
+from semgrid_eval.sources.town.drives import EXACT_MOTION, FRONT_TO_REAR_AXLE_M, MotionNoise, drive, report
 
 STEP_S = 0.059
 TIMES_S = 60.0 + STEP_S * np.arange(90)

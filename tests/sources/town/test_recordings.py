@@ -17,8 +17,7 @@ from semgrid_eval.errors import ConfigError, InputError, MissingExtraError
 from semgrid_eval.progress import silent
 from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
 from semgrid_eval.sources.town.rendering import render_recording
-from semgrid_eval.sources.town.scene import FIRST_PARKED_ID
-from semgrid_eval.sources.town.town import TownSpec, prepare_town
+from semgrid_eval.sources.town.town import FIRST_PARKED_ID, TownSpec, prepare_town
 
 PICTURES = ("image_png", "disparity_png", "label_png", "exact_label_png", "exact_disparity_png", "instance_png")
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from support.traffic import STEP_S, steady_traffic
 
-from semgrid_eval.sources.town.road_users import ROAD_USERS, type_index
-from semgrid_eval.sources.town.traffic import Traffic
+from semgrid_eval.sources.town.traffic import ROAD_USERS, Traffic, type_index
 
 BUS, PERSON = type_index("bus"), type_index("person")
 

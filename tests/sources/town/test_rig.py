@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from support.cameras import calibration
 
-from semgrid_eval.sources.town.matching import StereoMatcher, right_of
+from semgrid_eval.sources.town.rig import StereoMatcher, right_of
 from semgrid_eval.sources.town.sensors import Camera, cityscapes_camera
 
 CAMERA = Camera(cityscapes_camera(512, 256), 512, 256)

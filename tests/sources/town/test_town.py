@@ -7,8 +7,8 @@ from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.sources.town.ground import Surface
 from semgrid_eval.sources.town.kinds import KINDS
 from semgrid_eval.sources.town.network import read_network
-from semgrid_eval.sources.town.scene import FIRST_PARKED_ID, Scene, build_scene
 from semgrid_eval.sources.town.streets import lay_out_streets
+from semgrid_eval.sources.town.town import FIRST_PARKED_ID, Scene, build_scene
 
 STREET = (Surface.ROAD, Surface.MARKING, Surface.CROSSING, Surface.BICYCLE_LANE)
 

@@ -5,7 +5,7 @@ from click.testing import CliRunner
 from support.cityscapes_tree import Tree, put
 
 from semgrid_eval.cli.main import cli
-from semgrid_eval.cli.work import chosen_executor
+from semgrid_eval.cli.options import chosen_executor
 from semgrid_eval.executors import InProcess, Processes
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.scores.results import read_run, result_folder

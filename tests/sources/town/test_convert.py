@@ -3,7 +3,7 @@
 import pytest
 
 from semgrid_eval.sources.benchmarks import BENCHMARKS, load_benchmark
-from semgrid_eval.sources.town.benchmark import config_of, versions
+from semgrid_eval.sources.town.convert import config_of, versions
 
 
 @pytest.mark.parametrize("name", BENCHMARKS)

@@ -7,7 +7,8 @@ from support.driving import FRAME_NS, START_NS, driving
 
 from semgrid_eval.errors import LogError
 from semgrid_eval.log import codec
-from semgrid_eval.log.store import LogReader, read_recording, write_log
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.store import read_recording, write_log
 from semgrid_eval.recording.types import Pose
 
 
