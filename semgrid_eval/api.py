@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,7 +184,8 @@ def fit(
         windows: to learn from.
         seed: of the order of windows and whatever else chance decides.
         device: `auto`, `cpu`, `cuda`, `cuda:1` ...
-        folder: keeps a network's checkpoint, history and weights, so that the same call goes on after a stop.
+        folder: keeps a network's checkpoint, history and weights, so that the same call continues after a stop; take
+            another folder when the code of a network of your own has changed.
         validation: windows whose loss is noted after each epoch.
 
     Raises:
@@ -211,6 +212,8 @@ def run(
     device: str = "auto",
     jobs: int = 1,
     only: Sequence[str] = (),
+    models: Sequence[str] = (),
+    validation_logs: Path | str | None = None,
 ) -> RunRecord:
     """Train and score every row of a matrix file or preset; what is done already is kept.
 
@@ -221,6 +224,8 @@ def run(
         device: `auto`, `cpu`, `cuda`, `cuda:1` ...
         jobs: rows at once, each in a process of its own.
         only: names or patterns of rows, like `BL-*`; all if not given.
+        models: one more row for each, like `mine.py:Mine`.
+        validation_logs: folder of the logs to score, where they are not in `logs`.
 
     Raises:
         InputError: there is no log at all, or the device does not exist.
@@ -228,8 +233,11 @@ def run(
     """
     folder = Path(out)
     executor = local_executor(jobs)
-    options = RunOptions(device, folder / "grids", "semgrid_eval.run", tuple(only), executor, executor)
-    return run_matrix(load_matrix(str(matrix)), Path(logs), folder, options)
+    scored = None if validation_logs is None else Path(validation_logs)
+    options = RunOptions(
+        device, folder / "grids", "semgrid_eval.run", tuple(only), executor, executor, validation_logs=scored
+    )
+    return run_matrix(load_matrix(str(matrix), models=models), Path(logs), folder, options)
 
 
 def load_run(
@@ -245,12 +253,18 @@ def load_run(
     return load_figures(Path(run), metrics=metrics, partitions=partitions)
 
 
-def write_report(run: Path | str | Sequence[Path | str], out: Path | str | None = None) -> Path:
+def write_report(
+    run: Path | str | Sequence[Path | str],
+    out: Path | str | None = None,
+    *,
+    resample: Literal["recordings", "groups"] = "recordings",
+) -> Path:
     """Write the report of one run, or of several side by side, and return its page.
 
     Args:
         run: the folder of a run, or several.
         out: the folder to write; `report` in the (first) run if not given. A report there is replaced.
+        resample: recordings, or towns, cities or drives first.
 
     Raises:
         InputError: a run's record cannot be read, or `out` holds something other than a report.
@@ -258,4 +272,4 @@ def write_report(run: Path | str | Sequence[Path | str], out: Path | str | None 
     from semgrid_eval.report.page import write  # so that matplotlib is imported only for reports
 
     folders = [Path(run)] if isinstance(run, Path | str) else [Path(each) for each in run]
-    return write.write_report(folders, None if out is None else Path(out))
+    return write.write_report(folders, None if out is None else Path(out), resample=resample)

@@ -17,7 +17,7 @@ _SHOWN = ("processor", "cpu_cores", "torch_threads", "device", "gpu", "python", 
 @click.command("bench", epilog="Example: semgrid-eval bench --quick --only training,prediction")
 @click.option("--only", metavar="PART,...", help="Measure these parts alone.")
 @click.option("--quick", is_flag=True, help="Once each, and the smallest network alone.")
-@click.option("--device", default="cpu", show_default=True, help="Of networks: auto, cpu, cuda or cuda:N.")
+@click.option("--device", default="cpu", show_default=True, help="Device of networks: auto, cpu, cuda or cuda:N.")
 @click.option(
     "--json", "json_file", type=click.Path(path_type=Path, dir_okay=False), help="Also write everything there."
 )

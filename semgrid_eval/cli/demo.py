@@ -24,7 +24,7 @@ TOWNS = 8
 def command(out: Path, recordings: int, seed: int, device: str, workers: int) -> int:
     """Simulate a town, record drives through it as logs, train, score and report: a few minutes on two cores.
 
-    Prints the path of the finished page. What is done already is kept, so the same command goes on after a stop.
+    Prints the path of the finished page. Finished work is kept; run the same command again to continue.
     """
     from semgrid_eval.cli.convert import show
     from semgrid_eval.cli.run import show_run

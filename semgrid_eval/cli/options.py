@@ -68,7 +68,7 @@ def workers_option(text: str) -> Callable[[Command], Command]:
 def executor_options(command: Command) -> Command:
     """Add --executor and --address, in this order, to a command."""
     address = click.option(
-        "--address", default=LOCAL, show_default=True, help="Of a running Ray cluster; 'local' starts one here."
+        "--address", default=LOCAL, show_default=True, help="Address of a running Ray cluster; 'local' starts one here."
     )
     executor = click.option("--executor", type=click.Choice([LOCAL, "ray"]), default=LOCAL, show_default=True)
     return executor(address(command))

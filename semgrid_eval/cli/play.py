@@ -18,7 +18,7 @@ def command(run: Path, row: str, out: Path, logs: Path | None, recording: str | 
     """Write target, prediction, certainty, mask and inputs of a ROW's scored windows as an MCAP log.
 
     Grids are foxglove.Grid messages, which Foxglove and Lichtblick draw, and beside them, under /exact, the class ids
-    as they are scored. Their time is the one predicted for, their publish time that of the last input. Inputs are moved
+    as they are scored. Their log time is the target's time, their publish time that of the last input. Inputs are moved
     to the target's time, also those of a row without translation, whose model saw them not moved. With --all,
     recordings follow each other a second apart: the first keeps its times, those of the others are shifted. A layout
     for the viewer is written beside the log. Prints the path of the log.

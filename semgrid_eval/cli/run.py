@@ -59,7 +59,7 @@ def command(
 ) -> int:
     """Train and score every row of MATRIX, a YAML file or the name of a preset.
 
-    Whatever is finished already is kept: the same command goes on where it was stopped. A row that fails is noted
+    Finished work is kept; run the same command again to continue. A row that fails is noted
     with its reason, the others go on, and the exit code is 1.
 
     Rows can be spread over processes of this machine (--jobs) or over a Ray cluster (--executor ray), whose machines

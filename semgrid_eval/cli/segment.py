@@ -31,7 +31,7 @@ def command(logs: tuple[Path, ...], model: Path, out: Path, workers: int, **opti
 
     LOG is a log or a folder of logs. The network gets one RGB image, float (1, 3, H, W), normalised by --mean and
     --std, and gives scores (1, C, h, w) or ids (1, h, w), which are brought to the image's size. Everything else in the
-    logs is kept as it is. Logs whose log, model and options have not changed are left as they are; one that fails is
+    logs is kept as it is. Logs whose input, model and options have not changed are left as they are; one that fails is
     named, and the exit code is then 1.
     """
     from semgrid_eval.log.convert import Work

@@ -36,7 +36,7 @@ def choose_device(name: str = "auto") -> torch.device:
     except (RuntimeError, AssertionError, ImportError):
         device = None
     if device is None or device.type not in _DEVICE_TYPES:
-        raise ConfigError(f"no device {name!r} here; auto, cpu and cuda are known names", field="device")
+        raise ConfigError(f"there is no device {name!r} on this machine; use auto, cpu or cuda", field="device")
     return device
 
 

@@ -17,6 +17,8 @@ from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.network import Network, NetworkSettings
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
+_ATTRIBUTES = {"words": str, "family": str, "baseline": bool, "random": bool, "files": tuple | None}
+
 
 class _Guarded(Model):
     """Stands before a class of one's own: its exceptions and wrong answers become one line that names it."""
@@ -47,7 +49,7 @@ class _Guarded(Model):
     @classmethod
     def in_words(cls, settings: Any) -> str:  # noqa: ANN401 - of the class `Settings`
         with cls._guard():
-            return super().in_words(settings)
+            return str(super().in_words(settings))
 
     @classmethod
     def check(cls, settings: Any, given: Given) -> None:  # noqa: ANN401 - of the class `Settings`
@@ -95,6 +97,9 @@ def guarded(cls: object, spec: str, file: ModelFile | None) -> type[Model]:
     base = NetworkSettings if issubclass(cls, Network) else Config
     if not issubclass(cls.Settings, base):
         raise InputError(f"has `Settings` that do not have `{base.__name__}` as their base", field=spec)
+    for name, kind in _ATTRIBUTES.items():
+        if not isinstance(value := getattr(cls, name), kind):
+            raise InputError(f"is {value!r}, which is not of the type that it has to be", field=f"{spec}: {name}")
     guard = _GuardedNetwork if issubclass(cls, Network) else _Guarded
     facts = {"_own_name": spec, "_own_file": file, "family": cls.family or cls.__name__, "__module__": cls.__module__}
     unfitted = {} if cls.learns() else {"fit": Model.fit}  # the guard's own would look as if it learned

@@ -94,8 +94,7 @@ def _entry_point(name: str) -> importlib.metadata.EntryPoint:
 
 
 def _declared(cls: type[Model], folder: Path, spec: str) -> list[Path]:
-    paths = [folder / name for name in cls.files or ()]
-    for path in paths:
-        if not path.is_file():
-            raise InputError(f"declares the file {path.name}, which is not in {folder}", field=f"{spec}: files")
-    return paths
+    for name in cls.files or ():
+        if not (folder / name).is_file():
+            raise InputError(f"declares the file {name}, which is not in {folder}", field=f"{spec}: files")
+    return [folder / name for name in cls.files or ()]

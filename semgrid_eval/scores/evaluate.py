@@ -66,7 +66,15 @@ def evaluate(
         prediction, left_out = apply_mask(answer.prediction, seen.mask.cpu().numpy(), mask_mode)
         aligned = seen if windows.translate else replace(windows, translate=True).batch(chosen)
         target, inputs, actors = seen.target.cpu().numpy(), aligned.past.cpu().numpy(), windows.actors(chosen)
-        scored = ScoredWindows(target, prediction, answer.certainty, left_out, inputs, actors, spec)
+        scored = ScoredWindows(
+            target=target,
+            prediction=prediction,
+            certainty=answer.certainty,
+            left_out=left_out,
+            inputs=inputs,
+            actors=actors,
+            spec=spec,
+        )
         parts.append(replace(answer, sums=count_windows(scored)))
         progress(min(start + batch, len(windows)), len(windows))
     return Evaluation(

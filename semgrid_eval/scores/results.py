@@ -162,7 +162,7 @@ def write_run(run: Path, record: RunRecord) -> None:
 def read_run(run: Path) -> RunRecord:
     """Read a run's record; an InputError says that it is missing, malformed or of another format version."""
     if not (run / RUN_FILE).is_file():
-        raise ResultError("no run lies here (it has no run.json)", path=run)
+        raise ResultError("is not the folder of a run: it has no run.json", path=run)
     return _record(RunRecord, run / RUN_FILE)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from semgrid_eval.errors import InputError
 from semgrid_eval.scores.metrics.metric import Metric, Partition, column_names
 from semgrid_eval.scores.metrics.table import METRICS
 from semgrid_eval.scores.regions.table import PARTITIONS
@@ -72,6 +73,9 @@ def windows_with(sums: NDArray[np.integer]) -> NDArray[np.bool_]:
 
 
 def _counted(run: Path, metrics: Sequence[str] | None, partitions: Sequence[str] | None) -> Iterator[_Counted]:
+    for asked, table, what in ((metrics, METRICS, "metric"), (partitions, PARTITIONS, "partition")):
+        if unknown := [name for name in asked or () if name not in table]:
+            raise InputError(f"{unknown[0]!r} is not one of {', '.join(table)}", field=what)
     for row in read_run(run).rows:
         for result_id in row.results:
             folder = result_folder(run, result_id)

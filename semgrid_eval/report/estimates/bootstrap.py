@@ -5,7 +5,7 @@ seeds, so that differences between rows are paired. A recording is a whole log, 
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -26,8 +26,8 @@ Level = Literal["recordings", "groups"]
 DRAWS = 1000
 _SENTENCES: Mapping[Level, str] = {
     "recordings": "Intervals come from resampling recordings, taken as independent of each other, and seeds where "
-    "there are several. To resample towns, cities or drives first (--resample groups) made no interval wider where it "
-    "was tried, on the towns of town-v1.",
+    "there are several. `report --resample groups` resamples towns, cities or drives first, for recordings that depend "
+    "on each other.",
     "groups": "Intervals come from resampling groups of recordings (towns, cities or drives), then recordings within "
     "each group, since recordings of one group may depend on each other, and seeds where there are several.",
 }
@@ -117,6 +117,12 @@ class RowScores:
     draws: Floats  # (B, Q) of their mean, resampled
     totals: Counts  # (S, *shape) sums over windows
     windows: int  # how many windows have something to count in the region
+    by_inputs: bool = False  # whether rows of other inputs have other cells there
+
+    @property
+    def cells_key(self) -> tuple[object, ...]:
+        """What rows must share to be compared in the region: their targets and, where it asks for that, inputs."""
+        return self.row.question if self.by_inputs else (self.row.targets,)
 
     @cached_property
     def mean(self) -> dict[str, float]:
@@ -133,7 +139,7 @@ class RowScores:
         return weighted_sum([(1, self)], column)
 
     def minus(self, other: "RowScores", column: str) -> Estimate:
-        """Return the paired difference to another row; a ValueError says that its targets are others."""
+        """Return the paired difference to another row; a ValueError says that it is scored on other cells."""
         return weighted_sum([(1, self), (-1, other)], column)
 
 
@@ -146,11 +152,11 @@ Everything = Mapping[str, Mapping[str, Parts]]
 
 
 def weighted_sum(parts: Sequence[tuple[float, RowScores]], column: str) -> Estimate:
-    """Add up rows' scores by their weights, draw by draw; a ValueError says that their targets differ."""
+    """Add up rows' scores by their weights, draw by draw; a ValueError says that they are scored on other cells."""
     first = parts[0][1]
     for _, entry in parts:
-        if not comparable(first.row, entry.row):
-            raise ValueError(f"{first.row.name} and {entry.row.name} are scored on other targets")
+        if not comparable(first.row, entry.row) or first.cells_key != entry.cells_key:
+            raise ValueError(f"{first.row.name} and {entry.row.name} are scored on other targets or cells")
     at = column_names(first.metric).index(column)
     value = sum(weight * entry.mean[column] for weight, entry in parts)
     draws = np.sum([weight * entry.draws[:, at] for weight, entry in parts], axis=0)
@@ -181,7 +187,8 @@ def score_regions(rows: Sequence[Row], metric: Metric, division: Division, resam
     for number, region in enumerate(division.regions):
         counted = [(row, mine[number]) for row, mine in zip(rows, sums, strict=True) if mine[number].windows]
         if counted:
-            found[region] = _score_region(counted, metric, resampling)
+            scores = _score_region(counted, metric, resampling)
+            found[region] = {name: replace(each, by_inputs=division.by_inputs) for name, each in scores.items()}
     return found
 
 

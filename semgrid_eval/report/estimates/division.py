@@ -25,6 +25,7 @@ class Division:
     words: str  # what the regions hold, to follow "IoU"
     shown: Mapping[str, Sequence[str]]
     sums: Callable[[Row, Result, Metric], NDArray[np.int32] | None]
+    by_inputs: bool = False  # whether rows of other inputs have other cells, or windows, in a region
 
     def columns(self, metric: Metric) -> Sequence[str]:
         """Return the columns of a metric that a report shows."""
@@ -33,8 +34,12 @@ class Division:
 
 def of_cells(partition: Partition) -> Division:
     """Divide by where cells lie, as they were counted."""
-    p = partition
-    return Division(p.name, p.regions, p.words, p.shown, lambda _, result, metric: result.read(metric.name, p.name))
+
+    def sums(_: Row, result: Result, metric: Metric) -> NDArray[np.int32] | None:
+        return result.read(metric.name, partition.name)
+
+    names = partition.name, partition.regions, partition.words, partition.shown
+    return Division(*names, sums, partition.by_inputs)
 
 
 def of_windows(
@@ -55,7 +60,7 @@ def of_windows(
         found: NDArray[np.int32] = everywhere * inside.reshape(*inside.shape, *(1,) * len(metric.shape))
         return found
 
-    return Division(name, kinds, words, shown, sums)
+    return Division(name, kinds, words, shown, sums, by_inputs=True)
 
 
 EVERYWHERE = of_cells(PARTITIONS["all"])

@@ -112,5 +112,5 @@ def _hint(contest: Contest, windows: Sequence[Example]) -> str:
             "it has learned."
         )
     if len(contest.model.record.facts.sensors) > 1:
-        return "Each input is seen by several sensors; the target comes from the whole image."
+        return "Each input is seen by several sensors."
     return ""

@@ -179,10 +179,11 @@ def seed_frame(everything: Everything) -> pd.DataFrame:
 
 def division_records(everything: Everything) -> Records:
     """Return every figure with its interval and its difference to the row's baseline, for machines."""
+    rows = [entry.row for entry in everywhere(everything, "iou").values()]
     return {
         metric: {
             division: {
-                region: {name: _record(entry, scores) for name, entry in scores.items()}
+                region: {name: _record(entry, scores, rows) for name, entry in scores.items()}
                 for region, scores in parts.items()
             }
             for division, parts in divisions.items()
@@ -198,8 +199,8 @@ def _regions(of: Mapping[str, Mapping[str, Mapping[str, T]]]) -> Iterator[tuple[
                 yield {"metric": metric, "division": division, "region": region}, found
 
 
-def _record(entry: RowScores, scores: Scores) -> dict[str, Any]:
-    other, columns = reference_scores(entry, scores), column_names(entry.metric)
+def _record(entry: RowScores, scores: Scores, rows: Sequence[Row]) -> dict[str, Any]:
+    other, columns = reference_scores(entry, scores, rows), column_names(entry.metric)
     return {
         "windows": entry.windows,
         "seeds": len(entry.results),

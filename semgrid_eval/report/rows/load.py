@@ -95,6 +95,12 @@ class Row:
         return self.results[0].record.targets if self.results else ""
 
     @property
+    def question(self) -> tuple[object, ...]:
+        """What it is asked: targets, sensors, number of inputs, frames between them, horizon and translation."""
+        f = self.record.facts
+        return self.targets, f.sensors, f.inputs, f.step_frames, f.horizon_steps, f.translate
+
+    @property
     def shown(self) -> Result:
         """The result to show pictures of: the first one that kept its predictions."""
         kept = (result for result in self.results if (result.folder / files.PREDICTIONS_FILE).is_file())

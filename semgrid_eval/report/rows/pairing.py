@@ -32,9 +32,7 @@ def by_question(rows: Sequence[Row]) -> list[list[Row]]:
     """
     groups: dict[tuple[object, ...], list[Row]] = {}
     for row in rows:
-        f = row.record.facts
-        question = (row.targets, f.sensors, f.inputs, f.step_frames, f.horizon_steps, f.translate)
-        groups.setdefault(question, []).append(row)
+        groups.setdefault(row.question, []).append(row)
     return list(groups.values())
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.report.estimates.bootstrap import LABELS, Everything, Parts, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import LABELS, Everything, Parts, RowScores, Scores, everywhere
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.rows.load import Row, comparable
 from semgrid_eval.report.rows.pairing import (
@@ -104,27 +104,29 @@ def _to_baseline(kind: str) -> str:
 
 def division_tables(everything: Everything, divisions: Sequence[Division]) -> dict[str, list[Table]]:
     """Make the tables by division; one whose regions nobody knows has none."""
+    rows = [entry.row for entry in everywhere(everything, IOU.name).values()]
     return {
         division.name: [
             table
             for metric in METRICS.values()
             if not (metric is IOU and division.name == EVERYWHERE.name)  # which has tables of its own
-            for table in _tables(metric, division, everything[metric.name][division.name])
+            for table in _tables(metric, division, everything[metric.name][division.name], rows)
         ]
         for division in divisions
     }
 
 
-def _tables(metric: Metric, division: Division, parts: Parts) -> list[Table]:
+def _tables(metric: Metric, division: Division, parts: Parts, rows: Sequence[Row]) -> list[Table]:
     columns = division.columns(metric)
     if not columns or not parts:
         return []
     name = division.name if metric is IOU else f"{division.name}-{metric.name}"
     what = f"{metric.title} {division.words}".rstrip()
-    values = f"{what}, with 95% interval. Best of each in bold."
+    others = " Rows with other inputs have other cells here and are not compared." if division.by_inputs else ""
+    values = f"{what}, with 95% interval. Best of each in bold.{others}"
     differences = f"{what}: differences to the baseline, resampled together. Marked where the interval excludes zero."
     shown = {part: value_table(name, values, scores, columns) for part, scores in parts.items()}
-    gaps = {p: difference_table(f"{name}-differences", differences, each, columns) for p, each in parts.items()}
+    gaps = {p: difference_table(f"{name}-differences", differences, each, columns, rows) for p, each in parts.items()}
     alone = len(division.regions) == 1
     tables = (next(iter(each.values())) if alone else side_by_side(each) for each in (shown, gaps))
     return [table for table in tables if table is not None]

@@ -7,7 +7,7 @@ import numpy as np
 
 from semgrid_eval.report.claims.claims import paper_table
 from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores
-from semgrid_eval.report.rows.load import comparable
+from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.rows.pairing import reference_of, verdict
 from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, plural, signed
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
@@ -26,33 +26,43 @@ def value_table(
     return Table(name, caption + _OTHER_TARGETS * several, "Row", _headers(scores, columns), bodies)
 
 
-def difference_table(name: str, caption: str, scores: Scores, columns: Sequence[str]) -> Table | None:
-    """Show each row's paired difference to its baseline; None where no row has one."""
-    pairs = ((entry, reference_scores(entry, scores)) for entry in scores.values())
+def difference_table(
+    name: str, caption: str, scores: Scores, columns: Sequence[str], rows: Sequence[Row] = ()
+) -> Table | None:
+    """Show each row's paired difference to its baseline, one of `rows`; None where no row has one."""
+    pairs = ((entry, reference_scores(entry, scores, rows)) for entry in scores.values())
     return _differences(name, caption, [(entry, other) for entry, other in pairs if other], columns)
 
 
 def run_differences(name: str, caption: str, scores: Scores, columns: Sequence[str]) -> Table | None:
-    """Show, for rows of one name in several runs, the difference of each later run to the first on the same targets."""
-    first: dict[tuple[str, str], RowScores] = {}
+    """Show, for the same row in several runs, the difference of each later one to the first on the same targets.
+
+    Rows of one name are the same if they also have the same model and are asked the same.
+    """
+    first: dict[str, RowScores] = {}
+    pairs = []
     for entry in scores.values():
-        first.setdefault((entry.row.record.name, entry.row.targets), entry)
-    pairs = [(entry, first[entry.row.record.name, entry.row.targets]) for entry in scores.values()]
+        same = (entry.row.record.name, entry.row.record.facts, entry.row.targets)
+        pairs.append((entry, first.setdefault(repr(same), entry)))
     return _differences(name, caption, [(entry, other) for entry, other in pairs if entry is not other], columns)
 
 
-def reference_scores(entry: RowScores, scores: Scores) -> RowScores | None:
-    """Find the scores of the baseline that a row is measured against, None where it has none on the same targets."""
-    reference = reference_of(entry.row, [other.row for other in scores.values()])
-    return scores[reference.name] if reference is not None and comparable(entry.row, reference) else None
+def reference_scores(entry: RowScores, scores: Scores, rows: Sequence[Row] = ()) -> RowScores | None:
+    """Find the scores of the baseline that a row is measured against, None where it has none on the same cells.
+
+    It is the same in all regions where it is chosen from all `rows`, and not from those alone that have scores here.
+    """
+    reference = reference_of(entry.row, rows or [other.row for other in scores.values()])
+    other = None if reference is None else scores.get(reference.name)
+    return other if other is not None and other.cells_key == entry.cells_key else None
 
 
 def best_rows(scores: Scores, column: str) -> set[str]:
-    """Name the rows that are the best of those on the same targets; none is where it stands alone among others."""
-    groups: dict[str, dict[str, float]] = {}
+    """Name the rows that are the best of those on the same cells; none is where it stands alone among others."""
+    groups: dict[object, dict[str, float]] = {}
     for name, entry in scores.items():
         sign = {"higher": 1.0, "lower": -1.0, "": np.nan}[column_of(entry.metric, column).better]
-        groups.setdefault(entry.row.targets, {})[name] = entry.mean[column] * sign
+        groups.setdefault(entry.cells_key, {})[name] = entry.mean[column] * sign
     best: set[str] = set()
     for values in groups.values():
         top = max(filter(np.isfinite, values.values()), default=None)
@@ -70,7 +80,7 @@ def evidence(entry: RowScores, column: str) -> str:
 
 def seeds(entry: RowScores) -> str:
     """Count the seeds behind a row."""
-    return plural(len(entry.results), "seed") if entry.results[0].record.seed is not None else "no chance involved"
+    return plural(len(entry.results), "seed") if entry.results[0].record.seed is not None else "no training seed"
 
 
 def short_count(count: int) -> str:

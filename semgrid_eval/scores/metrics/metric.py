@@ -122,3 +122,4 @@ class Partition:
     words: str  # which cells the regions hold, to follow "IoU"; empty where it is all of them
     number: CellNumbers
     shown: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    by_inputs: bool = False  # whether regions depend on a row's inputs, so that rows of other inputs have other cells

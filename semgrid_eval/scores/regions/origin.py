@@ -18,4 +18,5 @@ ORIGIN = Partition(
     "by where the inputs had seen something",
     _number,
     {"accuracy": ("right",)},
+    by_inputs=True,
 )

@@ -26,7 +26,7 @@ _HELP = """Simulate towns and drive through them: logs OUT/<split>/town<NN>_<rec
 
 Traffic comes from Eclipse SUMO, pictures from ray casting with Embree; exact labels, disparity, instances, the pose
 and all road users with their velocities are on topics of their own. Training and validation have different towns.
-Logs that are up to date are left as they are, so that the same command goes on after a stop.
+Logs that are up to date are left as they are, so the same command can be run again to continue.
 """
 _PACKAGES = ("numpy", "opencv-python-headless", "eclipse-sumo", "embreex")
 _TOWN_V1_HELP = """Make the frozen data set town-v1 of the simulated town, which is the same everywhere.

@@ -35,12 +35,14 @@ class SyntheticConfig(Config):
     recordings: Annotated[int, Field(ge=1, le=100_000, description="How many, of 30 frames each.")]
     seed: Annotated[int, Field(ge=0, lt=1 << 31, description="The same seed gives the same bytes.")] = 0
     towns: Annotated[int, Field(ge=1, le=100, description="How many; each belongs to one split only.")] = 4
-    val_share: Annotated[float, Field(ge=0.0, lt=1.0, description="Of recordings and of towns, for validation.")] = 0.3
+    val_share: Annotated[
+        float, Field(ge=0.0, lt=1.0, description="Share of recordings, and of towns, for validation.")
+    ] = 0.3
     val_towns: Annotated[int | None, Field(ge=1, description=_VAL_TOWNS)] = None
     town_size_m: Annotated[float, Field(ge=250.0, le=2000.0, description=_TOWN_SIZE)] = 450.0
     duration_s: Annotated[float, Field(ge=10.0, le=3600.0, description=_DURATION)] = 90.0
-    width: Annotated[int, Field(ge=64, le=4096, description="Of the images in pixels.")] = 512
-    height: Annotated[int, Field(ge=32, le=2048, description="Of the images in pixels.")] = 256
+    width: Annotated[int, Field(ge=64, le=4096, description="Width of the images in pixels.")] = 512
+    height: Annotated[int, Field(ge=32, le=2048, description="Height of the images in pixels.")] = 256
     stereo: Annotated[Stereo, Field(description=_STEREO)] = "modelled"
 
     @model_validator(mode="after")
