@@ -1,7 +1,7 @@
 """The test of the house: what is new is one file and one line in a table, and the floors above find it.
 
-A source, a kind of sensor, a baseline, a trained network with a loss of its own and a metric are added here, each in a
-file of its own; the commands then convert, run and report them.
+A source, a kind of sensor, a baseline, a trained network with a loss of its own, a metric and a region of cells are
+added here, each in a file of its own; the commands then convert, run and report them.
 """
 
 import importlib
@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from semgrid_eval.cli.main import cli
 from semgrid_eval.models.registry import MODELS
 from semgrid_eval.scores.metrics.table import METRICS
+from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.sensors.kinds import KINDS
 from semgrid_eval.sources.known import SOURCES, Known
 
@@ -138,6 +139,19 @@ class Coverage:
     def cells(self, sums):
         return np.asarray(sums.sum(axis=-1, keepdims=True))
 """,
+    "seam_region": """
+import numpy as np
+
+from semgrid_eval.scores.metrics.metric import Partition
+
+
+def sides(scored):
+    columns = np.arange(scored.target.shape[2]) >= scored.target.shape[2] // 2
+    return np.broadcast_to(columns.astype(np.int64), scored.target.shape)
+
+
+SIDES = Partition("sides", ("left", "right"), "by the side of the road", sides)
+""",
 }
 
 TRAINING = {"epochs": 2, "updates_per_epoch": 3, "batch": 2}
@@ -169,6 +183,7 @@ def added(tmp_path, monkeypatch):
     monkeypatch.setitem(MODELS, "oldest", "seam_baseline:Oldest")
     monkeypatch.setitem(MODELS, "tiny", "seam_network:Tiny")
     monkeypatch.setitem(METRICS, "coverage", importlib.import_module("seam_metric").Coverage())
+    monkeypatch.setitem(PARTITIONS, "sides", importlib.import_module("seam_region").SIDES)
     yield tmp_path
     for name in FILES:
         sys.modules.pop(name, None)
@@ -202,8 +217,16 @@ def test_what_is_added_in_one_file_each_stands_in_a_finished_report(added):
     mean = {name: everywhere.loc[(name, "iou", "mean_known")].value for name in rows}
     assert mean["newest"] != mean["oldest"]
     assert everywhere.loc[("tiny-w2", "iou", "mean_known")].reference == "newest"
+    kerb = summary[(summary.division == "sides") & (summary.metric == "coverage") & (summary.row == "kerb")]
+    left, right = (kerb[kerb.region == side].value.item() for side in ("left", "right"))
+    assert min(left, right) < known["kerb"] < max(left, right)
     page = (added / "out" / "report" / "index.html").read_text()
-    for text in ("Share of cells that are predicted to be known", "tiny-w4", "oldest", "a tiny network"):
+    for text in (
+        "Share of cells that are predicted to be known",
+        "by the side of the road",
+        "tiny-w4",
+        "a tiny network",
+    ):
         assert text in page
 
 
@@ -215,19 +238,8 @@ def test_a_network_of_ones_own_is_trained_with_its_own_loss(added):
         (added / "n.yaml").write_text(
             yaml.safe_dump({"extends": "m.yaml", "models": {"tiny": {"weight": weight}}, "without": ["kerb", "oldest"]})
         )
-        command(
-            "run",
-            "n.yaml",
-            "--logs",
-            "logs",
-            "--out",
-            f"out{weight}",
-            "--device",
-            "cpu",
-            "--no-pictures",
-            "--workers",
-            1,
-        )
+        out = ("--out", f"out{weight}", "--device", "cpu", "--no-pictures", "--workers", 1)
+        command("run", "n.yaml", "--logs", "logs", *out)
         command("report", f"out{weight}")
         history = pd.read_csv(added / f"out{weight}" / "report" / "training.csv")
         losses.append(history[(history.row == "tiny-w2") & (history.epoch == 1)].loss.item())

@@ -71,6 +71,12 @@ class Untrained(Network):
     class Settings(Config):
         pass
 
+class Listed(Model):
+    files = ["table.txt"]
+
+class Maybe(Model):
+    baseline = "no"
+
 constant = 7
 class Alone:
     pass
@@ -134,6 +140,8 @@ def test_installed_entry_point_is_a_model(monkeypatch, batch):
         ("constant", r"own_models\.py:constant: is not a class that has `Model` or `Network` as its base"),
         ("Alone", r"own_models\.py:Alone: is not a class that has `Model` or `Network` as its base"),
         ("Untyped", r"own_models\.py:Untyped: has `Settings` that do not have `Config` as their base"),
+        ("Listed", r"own_models\.py:Listed: files: is \['table\.txt'\], which is not of the type that it has to be"),
+        ("Maybe", r"own_models\.py:Maybe: baseline: is 'no', which is not of the type"),
         ("Untrained", r"own_models\.py:Untrained: has `Settings` that do not have `NetworkSettings` as their base"),
     ],
 )

@@ -6,6 +6,7 @@ import pytest
 from support.fake_run import FakeRow, make_fake_run
 
 from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.errors import InputError
 from semgrid_eval.scores.metrics.table import METRICS
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.results import read_run, read_sums, result_folder
@@ -57,3 +58,10 @@ def test_frames_are_made_one_at_a_time(run):
 def test_a_run_without_results_gives_an_empty_frame(tmp_path):
     run = make_fake_run(tmp_path / "run", rows=(FakeRow("DC", "ED", failure="out of memory"),), recordings=1)
     assert load_figures(run).empty
+
+
+def test_names_that_nothing_is_counted_by_are_named(run):
+    with pytest.raises(InputError, match=r"metric: 'nope' is not one of iou, accuracy, calibration"):
+        load_figures(run, metrics=["nope"])
+    with pytest.raises(InputError, match=r"partition: 'nope' is not one of all, actors, distance, origin"):
+        load_figures(run, partitions=["nope"])

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.fake_run import counted_row
+from support.fake_run import FakeRow, counted_row, make_fake_run
 from support.scoring import score_rows
 
 from semgrid_eval.report.estimates.bootstrap import Resampling, score_regions
@@ -17,8 +17,9 @@ from semgrid_eval.report.tables.values import (
     side_by_side,
     value_table,
 )
-from semgrid_eval.scores.metrics.table import CALIBRATION, IOU
+from semgrid_eval.scores.metrics.table import CALIBRATION, IOU, METRICS
 from semgrid_eval.scores.regions.actors import ACTORS
+from semgrid_eval.scores.regions.origin import ORIGIN
 
 SHOWN = ("vehicles", "person", "bicycle")
 
@@ -85,11 +86,38 @@ def test_a_row_has_no_baseline_on_other_targets():
     assert reference_scores(same["ED-DC"], same) is same["BL-DC"]
 
 
-def test_runs_are_subtracted_where_they_share_their_targets(scores):
+def test_where_cells_hang_on_the_inputs_rows_of_other_inputs_are_not_compared(tmp_path):
+    kinds = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 1), FakeRow("SL3", "ED", 0.2, 1, inputs=3))
+    rows = load_runs([make_fake_run(tmp_path / "run", rows=kinds, recordings=2)])[0].rows
+    everywhere = score_regions(rows, METRICS["accuracy"], EVERYWHERE, Resampling(0, draws=5))["all"]
+    seen = score_regions(rows, METRICS["accuracy"], of_cells(ORIGIN), Resampling(0, draws=5))["in the newest input"]
+    references = [
+        [other and other.row.name for other in (reference_scores(scores[name], scores) for name in ("ED-DC", "ED-SL3"))]
+        for scores in (everywhere, seen)
+    ]
+    assert references == [["BL-DC", "BL-DC"], ["BL-DC", None]]
+    assert best_rows(seen, "right") == {"BL-DC"}
+
+
+def test_the_baseline_of_a_row_is_the_same_in_all_regions(tmp_path):
+    kinds = (FakeRow("DC", "BL"), FakeRow("NT", "BL", translate=False), FakeRow("NT", "ED", 0.1, 1, translate=False))
+    rows = load_runs([make_fake_run(tmp_path / "run", rows=kinds, recordings=2)])[0].rows
+    scores = score_regions(rows, IOU, EVERYWHERE, Resampling(0, draws=5))["all"]
+    assert reference_scores(scores["ED-NT"], scores, rows).row.name == "BL-NT"
+    without = {name: entry for name, entry in scores.items() if name != "BL-NT"}
+    assert reference_scores(scores["ED-NT"], without, rows) is None  # and not BL-DC
+
+
+def test_runs_are_subtracted_where_they_share_their_model_and_targets(scores):
     rows = [entry.row for entry in scores.values()]
     again = [replace(row, name=f"{row.name} (2)") for row in rows]
     others = [on_targets(row, "other", f"{row.name} (3)") for row in rows]
-    table = run_differences("runs", "", score_rows([*rows, *again, *others], 0, draws=5), ("road",))
+    models = [
+        replace(row, name=f"{row.name} (4)", record=row.record.model_copy(update={"facts": facts}))
+        for row in rows
+        for facts in [row.record.facts.model_copy(update={"model": "another"})]
+    ]
+    table = run_differences("runs", "", score_rows([*rows, *again, *others, *models], 0, draws=5), ("road",))
     assert [body[0].header for body in table.bodies] == [f"{row.name} (2) \N{MINUS SIGN} {row.name}" for row in rows]
 
 
