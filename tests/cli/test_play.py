@@ -63,7 +63,7 @@ def test_inputs_are_moved_for_a_row_without_translation_too_as_the_help_says(her
     ("arguments", "code", "message"),
     [
         (["runs/first", "BL-Sp"], 1, "Error: runs/first: there is no row 'BL-Sp', only BL-DC, BL-NT"),
-        (["nowhere", "BL-DC"], 1, "Error: nowhere: no run lies here"),
+        (["nowhere", "BL-DC"], 1, "Error: nowhere: is not the folder of a run: it has no run.json"),
         (["runs/first", "BL-DC", "--all", "--recording", "toy"], 2, "--recording names one recording"),
     ],
 )

@@ -170,7 +170,10 @@ def test_a_failing_row_is_one_line_and_exit_code_1(here):
             ["run", "no_class.yaml", "--logs", "logs", "--out", "run"],
             "grid: class_map.car: 'rood' is not one of unknown",
         ),
-        (["run", "smoke", "--logs", "logs", "--out", "run", "--device", "tpu"], "device: no device 'tpu' here"),
+        (
+            ["run", "smoke", "--logs", "logs", "--out", "run", "--device", "tpu"],
+            "device: there is no device 'tpu' on this machine",
+        ),
         (["run", "smoke", "--logs", "empty", "--out", "run"], "empty: holds no .mcap log"),
         (["run", "smoke", "--logs", "logs", "--out", "file/run"], "cannot be written"),
         (["grids", "logs", "out", "--config", "grid.yaml"], "grid.yaml: morfology: unknown key"),

@@ -26,7 +26,9 @@ def test_auto_takes_cuda_where_there_is_one():
 
 @pytest.mark.parametrize("name", ["gpu", "cuda:99", "hpu", "meta"])
 def test_device_that_is_not_there_is_a_config_error(name):
-    with pytest.raises(ConfigError, match=f"device: no device '{name}' here"):
+    with pytest.raises(
+        ConfigError, match=f"device: there is no device '{name}' on this machine; use auto, cpu or cuda"
+    ):
         choose_device(name)
 
 

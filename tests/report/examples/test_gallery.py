@@ -85,7 +85,7 @@ def test_a_run_without_pictures_shows_the_same_windows(seen, tmp_path):
     ]
     shown = [p for group in groups for w in group.windows for column in w.film for p in column.pictures]
     assert {picture.kind for picture in shown} == {"grid"}
-    assert groups[4].hint == "Each input is seen by several sensors; the target comes from the whole image."
+    assert groups[4].hint == "Each input is seen by several sensors."
     assert len(gaps(rows, groups)) == 1
 
 
