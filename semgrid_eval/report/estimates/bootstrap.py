@@ -26,8 +26,8 @@ Level = Literal["recordings", "groups"]
 DRAWS = 1000
 _SENTENCES: Mapping[Level, str] = {
     "recordings": "Intervals come from resampling recordings, taken as independent of each other, and seeds where "
-    "there are several. `report --resample groups` resamples towns, cities or drives first, for recordings that depend "
-    "on each other.",
+    "there are several. For recordings that depend on each other, semgrid-eval report --resample groups resamples "
+    "towns, cities or drives first.",
     "groups": "Intervals come from resampling groups of recordings (towns, cities or drives), then recordings within "
     "each group, since recordings of one group may depend on each other, and seeds where there are several.",
 }
