@@ -28,7 +28,7 @@ def command(only: str | None, device: str, json_file: Path | None, *, quick: boo
     log; grids: making them; training: of networks, against a textbook's float32 loop and against the product of large
     matrices; prediction: with networks, and scoring. Where something is promised, that stands beside the number.
     """
-    from semgrid_eval.bench.parts import PARTS, conditions, load, measure
+    from semgrid_eval.bench.suite import PARTS, conditions, load, measure
     from semgrid_eval.models.device import choose_device
 
     parts = PARTS if only is None else [part.strip() for part in only.split(",")]

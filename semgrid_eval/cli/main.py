@@ -36,7 +36,7 @@ class _LazyGroup(click.Group):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
-            what_next = "; the same command goes on from here" if ctx.invoked_subcommand in _GO_ON else ""
+            what_next = "; the same command continues from here" if ctx.invoked_subcommand in _GO_ON else ""
             raise click.Abort(what_next) from error
 
 

@@ -107,7 +107,7 @@ def _note(outcome: _Outcome | WorkerDied, label: str, summary: ConversionSummary
     if isinstance(outcome, WorkerDied):
         summary.failed[label] = outcome.reason
     elif outcome.disk_full:
-        raise InputError(f"{outcome.failure}; what is written is whole: make room, and the same command goes on")
+        raise InputError(f"{outcome.failure}; what is written is whole: make room, and the same command continues")
     elif outcome.failure is not None:
         summary.failed[label] = outcome.failure
     else:

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from semgrid_eval.bench.measurement import Settings
-from semgrid_eval.bench.parts import PARTS
+from semgrid_eval.bench.suite import PARTS
 from semgrid_eval.cli import bench
 from semgrid_eval.cli.main import cli, main
 

@@ -187,5 +187,5 @@ def test_a_disk_that_is_full_is_one_line_after_the_progress(define, tmp_path, mo
     assert code == 1
     assert [line for line in lines if not line.startswith("simulate: ")] == [
         f"Error: {tmp_path}/{LABELS[0]}.mcap: cannot be written: No space left on device; "
-        "what is written is whole: make room, and the same command goes on"
+        "what is written is whole: make room, and the same command continues"
     ]

@@ -72,7 +72,7 @@ def test_a_terminated_conversion_leaves_nothing_half_written_and_says_that_it_go
     os.close(digested)
     until(lambda: list(logs.rglob("*.part")))
     converted = opened(tmp_path / "labels" / f"{name}.png")
-    assert told_at_termination(process) == (130, "Stopped; the same command goes on from here.")
+    assert told_at_termination(process) == (130, "Stopped; the same command continues from here.")
     os.close(converted)
     assert [path for path in logs.rglob("*") if path.is_file()] == []
 

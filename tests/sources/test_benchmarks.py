@@ -1,4 +1,4 @@
-"""The frozen benchmarks: their definitions, and how recordings are held against the published ones."""
+"""The frozen benchmarks: their definitions, and how recordings are compared with the published ones."""
 
 import pytest
 

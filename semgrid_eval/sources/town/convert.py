@@ -32,7 +32,7 @@ _PACKAGES = ("numpy", "opencv-python-headless", "eclipse-sumo", "embreex")
 _TOWN_V1_HELP = """Make the frozen data set town-v1 of the simulated town, which is the same everywhere.
 
 It has 300 recordings for training and 120 for validation, or 2,975 and 500 with --size full. The last line says whether
-every recording is the published one. Logs that are up to date are left as they are, so that the same command goes on
+every recording is the published one. Logs that are up to date are left as they are, so that the same command continues
 after a stop.
 """
 

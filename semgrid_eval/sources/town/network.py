@@ -13,7 +13,6 @@ from semgrid_eval.geometry import Floats
 
 _DEFAULT_WIDTH_M = 3.2
 
-
 LaneUse = Enum("LaneUse", "SIDEWALK PARKING BICYCLE CAR")
 """Whom a lane is for; a lane that nobody may drive on is the parking strip."""
 _USES = {"pedestrian": LaneUse.SIDEWALK, "bicycle": LaneUse.BICYCLE}
