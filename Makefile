@@ -28,7 +28,7 @@ test: $(READY)  ## the whole suite
 check: $(READY)  ## lint, format and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+	$(BIN)/mypy --explicit-package-bases semgrid_eval tools/*.py
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)

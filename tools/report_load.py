@@ -31,7 +31,7 @@ def main() -> None:
     for name, number in (("rows", 18), ("repeats", 20), ("windows", 500)):
         parser.add_argument(f"--{name}", type=int, default=number)
     options = parser.parse_args()
-    if not results.run_file(options.run).is_file():
+    if not (options.run / results.RUN_FILE).is_file():
         make_run(options.run, options.rows, options.repeats, options.windows)
     start_s = time.perf_counter()
     command = "import sys; from pathlib import Path; from semgrid_eval.report.page.write import write_report; "
@@ -95,10 +95,7 @@ def _row(
         results.write_result(folder, _result(result_id, seed, facts, windows))
         ids.append(result_id)
     name = "BL-DC" if number == 0 else f"ED-{number}"
-    loose = {"experiment": name[3:], "model": name[:2], "inputs": 2, "step_frames": 5, "horizon_steps": 1}
-    rest = {"sensors": ("full",), "translate": True} | loose
-    rest = {key: value for key, value in rest.items() if key in results.RowRecord.model_fields}
-    return results.RowRecord(facts=facts, name=name, label=name, results=tuple(ids), **rest)
+    return results.RowRecord(facts=facts, name=name, label=name, results=tuple(ids))
 
 
 def _result(

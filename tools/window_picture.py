@@ -3,16 +3,15 @@
 Example: python tools/window_picture.py demo/run ED-DC docs/demo.png
 """
 
-import io
 import sys
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
+from semgrid_eval.classes import MASK_COLOUR, class_palette
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file
-from semgrid_eval.report.examples.drawing import grid_png
 from semgrid_eval.scores.results import read_predictions, read_result, read_run, read_windows, result_folder
 
 WINDOWS = 4
@@ -22,7 +21,10 @@ GAP_PX = 6
 
 def tile(grid: np.ndarray, mask: np.ndarray | None = None) -> Image.Image:
     """Draw one grid (H, W), each cell `SCALE` pixels wide."""
-    picture = Image.open(io.BytesIO(grid_png(grid, mask))).convert("RGB")
+    colours = class_palette(safe=True)[grid]
+    picture = Image.fromarray(
+        colours if mask is None else np.where(mask[..., None], MASK_COLOUR, colours).astype(np.uint8)
+    )
     return picture.resize((picture.width * SCALE, picture.height * SCALE), Image.Resampling.NEAREST)
 
 
