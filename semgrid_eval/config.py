@@ -79,6 +79,14 @@ _StrictLoader.add_constructor(_tag("int"), _StrictLoader.construct_int)
 C = TypeVar("C", bound=BaseModel)
 
 
+def strictly(model: type[C], value: object) -> C:
+    """Validate a plain value; what is wrong with it is raised as pydantic does.
+
+    JSON is the strict border: it allows lists for tuples and names for enums, and nothing else that YAML guesses.
+    """
+    return model.model_validate_json(json.dumps(value, default=str))
+
+
 def parse_config(model: type[C], value: object, *, path: Path | str | None = None) -> C:
     """Validate a plain value against a config class.
 
@@ -87,8 +95,7 @@ def parse_config(model: type[C], value: object, *, path: Path | str | None = Non
             key, the allowed ones.
     """
     try:
-        # JSON is the strict border: it allows lists for tuples and names for enums, and nothing else that YAML guesses.
-        return model.model_validate_json(json.dumps(value, default=str))
+        return strictly(model, value)
     except ValidationError as error:
         raise _first_fault(model, error, path) from None
     except (ValueError, TypeError) as error:

@@ -6,7 +6,7 @@ A `path` is where the bytes come from, for the InputError that is raised where t
 import io
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -93,8 +93,13 @@ def encode_gray(picture: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     """Encode a picture (H, W), uint8 or uint16, as a gray PNG file."""
     assert picture.ndim == 2
     assert picture.dtype in (np.uint8, np.uint16)
-    done, data = cv2.imencode(".png", picture)
-    assert done
+    return encode(picture)
+
+
+def encode(picture: NDArray[np.uint8] | NDArray[np.uint16], parameters: Sequence[int] = ()) -> bytes:
+    """Encode a picture (H, W), or (H, W, 3) in OpenCV's order BGR, as a PNG file with parameters of OpenCV."""
+    done, data = cv2.imencode(".png", picture, parameters)
+    assert done, "OpenCV encodes every 8 or 16 bit image"
     return data.tobytes()
 
 

@@ -1,7 +1,6 @@
 """The kinds of sensors, and what all of them saw at the times of one: who adds a kind adds its line to `KINDS`."""
 
 import heapq
-import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, SerializeAsAny, StringConstraints
 
+from semgrid_eval.config import strictly
 from semgrid_eval.sensors.camera import CameraSensor, read_cameras
 from semgrid_eval.sensors.sensor import Kind, Points, SensorConfig
 
@@ -30,7 +30,7 @@ def _of_its_kind(value: object) -> object:
     config = KINDS[kind].config
     if unknown := [key for key in value if key not in config.model_fields]:
         raise ValueError(f"unknown key {unknown[0]!r}; allowed here: {', '.join(sorted(config.model_fields))}")
-    return config.model_validate_json(json.dumps(value, default=str))
+    return strictly(config, value)
 
 
 SensorName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}$")]

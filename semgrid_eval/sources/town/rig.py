@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.recording.png import encode
 from semgrid_eval.recording.types import CameraFrame
 from semgrid_eval.sources.town.noise import DisparityErrors, DisparityNoise, LabelErrors, LabelNoise
 from semgrid_eval.sources.town.sensors import Camera, View
@@ -99,12 +100,12 @@ class Rig:
         measured_px = self._measured(exact_px, [picture for _, picture in pictures])
         return CameraFrame(
             stamp_ns=stamp_ns,
-            image_png=_png(image[:, margin_px:], _COLOUR_PNG),
-            disparity_png=_png(coded_disparity(measured_px), _GREY_PNG),
-            label_png=_png(self._labels.add(label) if self._labels else label, _GREY_PNG),
-            exact_label_png=_png(label, _GREY_PNG),
-            exact_disparity_png=_png(coded_disparity(exact_px), _GREY_PNG),
-            instance_png=_png(instance, _GREY_PNG),
+            image_png=encode(image[:, margin_px:], _COLOUR_PNG),
+            disparity_png=encode(coded_disparity(measured_px), _GREY_PNG),
+            label_png=encode(self._labels.add(label) if self._labels else label, _GREY_PNG),
+            exact_label_png=encode(label, _GREY_PNG),
+            exact_disparity_png=encode(coded_disparity(exact_px), _GREY_PNG),
+            instance_png=encode(instance, _GREY_PNG),
         )
 
     def _measured(self, exact_px: NDArray[np.float32], images: list[NDArray[np.uint8]]) -> NDArray[np.float32]:
@@ -117,9 +118,3 @@ def coded_disparity(disparity_px: NDArray[np.float32]) -> NDArray[np.uint16]:
     """Code disparities (H, W) as Cityscapes does: p = 256 d + 1, and 0 for what is not positive or too large."""
     coded = np.rint(disparity_px * np.float32(256.0)) + np.float32(1.0)
     return np.where((disparity_px > 0.0) & (coded <= 65535.0), coded, 0.0).astype(np.uint16)
-
-
-def _png(image: NDArray[np.uint8] | NDArray[np.uint16], parameters: list[int]) -> bytes:
-    done, data = cv2.imencode(".png", image, parameters)
-    assert done, "OpenCV encodes every 8 or 16 bit image"
-    return data.tobytes()

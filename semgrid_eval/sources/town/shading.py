@@ -10,6 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.sources.town.columns import Columns
 from semgrid_eval.sources.town.ground import SURFACE_COLOURS, Surface
 from semgrid_eval.sources.town.sensors import NO_TRIANGLE, Camera, RayCaster, View, cast_at_all
 from semgrid_eval.sources.town.solids import Soup, Texture
@@ -50,7 +51,7 @@ def draw_sunlight(rng: np.random.Generator) -> Sunlight:
 
 
 @dataclass(frozen=True)
-class _Materials:
+class _Materials(Columns):
     """How each triangle, or in a table of their own each surface of the ground, takes the light (M,)."""
 
     normal: NDArray[np.float32]  # (M, 3)
@@ -76,10 +77,6 @@ class _Materials:
         plain = np.full(count, Texture.PLAIN, np.uint8)
         colour = SURFACE_COLOURS.astype(np.float32)
         return cls(normal, normal @ sun, np.zeros(count, bool), colour, plain, _GROUND_CONTRAST)
-
-    @staticmethod
-    def joined(parts: "Sequence[_Materials]") -> "_Materials":
-        return _Materials(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(_Materials)))
 
 
 class Painter:

@@ -1,15 +1,15 @@
 """The solids that everything in the town is made of, tapered boxes, trees and bushes, turned into triangles."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
+from semgrid_eval.sources.town.columns import Columns
 
 Texture = IntEnum("Texture", "PLAIN FACADE ROOF FOLIAGE GLASS PLANKS", start=0)
 """How a surface is shaded."""
@@ -55,7 +55,7 @@ def box(
 
 
 @dataclass(frozen=True)
-class Soup:
+class Soup(Columns):
     """Triangles with what a camera can know of them: (F, 3, 3) corners and one value a triangle of all else."""
 
     triangles_m: NDArray[np.float32]
@@ -67,29 +67,10 @@ class Soup:
     def __len__(self) -> int:
         return len(self.label)
 
-    def where(self, keep: NDArray[np.bool_]) -> "Soup":
-        """Return the triangles for which `keep` (F,) holds."""
-        return Soup(*(getattr(self, entry.name)[keep] for entry in fields(self)))
-
     def moved(self, x_m: float, y_m: float) -> "Soup":
         """Return the soup moved by x, y, computed in double precision."""
         offset_m = np.array([x_m, y_m, 0.0])
         return replace(self, triangles_m=(self.triangles_m.astype(np.float64) + offset_m).astype(np.float32))
-
-    @staticmethod
-    def joined(parts: list["Soup"]) -> "Soup":
-        """Return all triangles of several soups, in order."""
-        return Soup(*(np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(Soup)))
-
-    def save(self, folder: Path) -> None:
-        """Write one `.npy` file an array."""
-        for entry in fields(self):
-            np.save(folder / f"{entry.name}.npy", getattr(self, entry.name))
-
-    @classmethod
-    def load(cls, folder: Path) -> "Soup":
-        """Map the arrays from disk; only what is touched is read."""
-        return cls(*(np.load(folder / f"{entry.name}.npy", mmap_mode="r") for entry in fields(cls)))
 
 
 def soup_of_boxes(boxes: NDArray[np.void]) -> Soup:

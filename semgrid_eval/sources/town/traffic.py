@@ -1,14 +1,14 @@
 """The road users and their traffic over time: who is where at any moment, from arrays mapped from disk."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import IntEnum
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
+from semgrid_eval.sources.town.columns import Arrays, Columns
 
 Shape = IntEnum("Shape", "CAR VAN TRUCK BUS BICYCLE PERSON", start=0)
 """How a road user looks; each has a model of its own."""
@@ -54,7 +54,7 @@ _IS_PERSON = np.array([user.shape is Shape.PERSON for user in ROAD_USERS])
 
 
 @dataclass(frozen=True)
-class Snapshot:
+class Snapshot(Columns):
     """Everybody at one moment; all arrays have one row an actor."""
 
     actor: NDArray[np.int32]  # (A,) index of the actor in its town
@@ -66,13 +66,9 @@ class Snapshot:
     def __len__(self) -> int:
         return len(self.actor)
 
-    def where(self, keep: NDArray[np.bool_]) -> "Snapshot":
-        """Return the actors for which `keep` (A,) holds."""
-        return Snapshot(*(getattr(self, entry.name)[keep] for entry in fields(self)))
-
 
 @dataclass(frozen=True)
-class Traffic:
+class Traffic(Arrays):
     """SUMO's trajectories, sorted by time; rows `offsets[i]` to `offsets[i + 1]` belong to `times_s[i]`."""
 
     times_s: Floats  # (T,) times of the steps
@@ -82,16 +78,6 @@ class Traffic:
     heading_rad: NDArray[np.float32]  # (R,) counter-clockwise from the map's x axis
     speed_mps: NDArray[np.float32]  # (R,) along the heading
     actor_types: NDArray[np.uint8]  # (A,) index into `ROAD_USERS` of each actor
-
-    def save(self, folder: Path) -> None:
-        """Write one `.npy` file an array."""
-        for entry in fields(self):
-            np.save(folder / f"{entry.name}.npy", getattr(self, entry.name))
-
-    @classmethod
-    def load(cls, folder: Path) -> "Traffic":
-        """Map the arrays from disk; only what is touched is read."""
-        return cls(*(np.load(folder / f"{entry.name}.npy", mmap_mode="r") for entry in fields(cls)))
 
     def step_before(self, time_s: float) -> int:
         """Return the step at or before a time, such that a next step exists."""
