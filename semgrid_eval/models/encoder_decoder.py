@@ -11,7 +11,8 @@ from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.model import Given
 from semgrid_eval.models.network import Constants, Network, NetworkSettings, input_planes
-from semgrid_eval.windows.data import WindowBatch
+from semgrid_eval.models.prior import CellPrior
+from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 Activation = Literal["linear", "relu"]
 DROPOUT_RATE = 0.5
@@ -24,6 +25,7 @@ class EncoderDecoderSettings(NetworkSettings):
     features: int = Field(default=64, ge=2, le=512)  # channels of the first block, f
     decoder_activation: Activation = "linear"  # of the decoder's convolutions (reading 5)
     constants: Constants = "keras"  # whose constants batch normalisation and initial weights follow (reading 7)
+    prior: bool = False  # whether it adds to the table of `models.prior`, as the paper's does not
 
     @field_validator("features")
     @classmethod
@@ -58,12 +60,15 @@ class EncoderDecoder(Network):
         self.classify = nn.Conv2d(settings.features // 2, CLASS_COUNT, 1)
         if constants == "keras":
             self.apply(_initialise_as_keras)
+        self.prior = CellPrior(given) if settings.prior else None
+        if settings.prior:
+            nn.init.zeros_(self.classify.weight)
         self.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack this form
 
     @classmethod
     def in_words(cls, settings: EncoderDecoderSettings) -> str:
         """Say what the model does."""
-        return f"encoder-decoder d {settings.depth}, f {settings.features}"
+        return f"encoder-decoder d {settings.depth}, f {settings.features}" + ", over a table" * settings.prior
 
     @classmethod
     def check(cls, settings: EncoderDecoderSettings, given: Given) -> None:
@@ -75,9 +80,15 @@ class EncoderDecoder(Network):
                 f"depth {settings.depth} needs grids of a multiple of {factor} cells, not {size}", field="settings"
             )
 
+    def prepare(self, windows: WindowSet) -> None:
+        """Count the table, where there is one."""
+        if self.prior is not None:
+            self.prior.count(windows)
+
     def forward(self, batch: WindowBatch) -> Tensor:
         """Score the target: (B, C, H, W) logits."""
-        return self.from_planes(input_planes(batch.past))
+        logits = self.from_planes(input_planes(batch.past))
+        return logits.float() + self.prior(batch) if self.prior is not None else logits
 
     def from_planes(self, planes: Tensor) -> Tensor:
         """Score the target from class probabilities: (B, S * T * C, H, W) -> (B, C, H, W) logits."""

@@ -1,5 +1,6 @@
 """What gradients train: a torch module with its loss, optimiser and schedule, and grids as planes for its layers."""
 
+import math
 from collections.abc import Iterator
 from typing import Any, Literal, Self, TypeVar
 
@@ -11,8 +12,8 @@ from torch.nn import functional as F
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config
 from semgrid_eval.models.device import Precision, choose_precision, seeded
-from semgrid_eval.models.model import Given, Model
-from semgrid_eval.windows.data import WindowBatch
+from semgrid_eval.models.model import Given, Model, one_hot
+from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 Constants = Literal["keras", "torch"]
 _IGNORED = -100
@@ -37,18 +38,20 @@ class OptimizerConfig(Config):
 
 
 class ScheduleConfig(Config):
-    """The learning rate, epoch by epoch; the defaults are the paper's."""
+    """The learning rate over a training; the defaults are the paper's."""
 
     learning_rate: float = Field(default=1e-3, gt=0)
-    drop_epoch: int | None = Field(
-        default=35, ge=0
-    )  # epochs after it use `rate_after_drop`; None keeps `learning_rate`
+    shape: Literal["drop", "cosine"] = "drop"  # `cosine` warms up, then falls to nothing as half a wave does
+    # Of `drop`: epochs after it use `rate_after_drop`; None keeps `learning_rate`.
+    drop_epoch: int | None = Field(default=35, ge=0)
     rate_after_drop: float = Field(default=1e-4, gt=0)
+    warm_up: float = Field(default=0.05, ge=0, lt=1)  # of `cosine`: share of the updates in which the rate rises
 
-    def rate_in(self, epoch: int) -> float:
-        """Learning rate of an epoch, counted from 0."""
-        late = self.drop_epoch is not None and epoch >= self.drop_epoch
-        return self.rate_after_drop if late else self.learning_rate
+
+class LossConfig(Config):
+    """What a training makes small: the paper's cross entropy, and more on request."""
+
+    jaccard: float = Field(default=0.0, ge=0)  # weight of the soft Jaccard loss beside the cross entropy
 
 
 class TrainingConfig(Config):
@@ -62,6 +65,7 @@ class TrainingConfig(Config):
     clip_norm: float | None = Field(default=None, gt=0)  # limit of the gradient's norm; the paper has none
     optimizer: OptimizerConfig = OptimizerConfig()
     schedule: ScheduleConfig = ScheduleConfig()
+    loss: LossConfig = LossConfig()
 
     @model_validator(mode="after")
     def _epoch_holds_a_batch(self) -> Self:
@@ -73,6 +77,18 @@ class TrainingConfig(Config):
         """Updates made when `epoch` epochs are over; a batch that two epochs share counts for the second."""
         per_update = self.batch if self.epoch_unit == "windows" else 1
         return epoch * self.updates_per_epoch // per_update
+
+    def rate_at(self, update: int, epoch: int) -> float:
+        """Learning rate of an update in its epoch, both counted from 0."""
+        schedule = self.schedule
+        if schedule.shape == "drop":
+            late = schedule.drop_epoch is not None and epoch >= schedule.drop_epoch
+            return schedule.rate_after_drop if late else schedule.learning_rate
+        total = self.updates_until(self.epochs)
+        rising = max(1, round(schedule.warm_up * total))
+        if update < rising:
+            return schedule.learning_rate * (update + 1) / rising
+        return schedule.learning_rate * 0.5 * (1 + math.cos(math.pi * (update - rising) / max(1, total - rising)))
 
 
 class NetworkSettings(Config):
@@ -92,13 +108,17 @@ class Network(Model, torch.nn.Module):
     random = True
     files = ()
 
+    def prepare(self, windows: WindowSet) -> None:
+        """Set what a training starts from by its windows, before the first update; most networks need nothing."""
+
     def forward(self, batch: WindowBatch) -> Tensor:
         """Score the target from a batch's past and motion: (B, C, H, W) logits."""
         raise NotImplementedError(f"{type(self).__name__} has no `forward`")
 
     def loss(self, logits: Tensor, batch: WindowBatch) -> Tensor:
         """Return what the training makes small: float32 logits (B, C, H, W) -> scalar, a mean over the windows."""
-        return masked_loss(logits, batch.target, batch.mask)
+        loss, weight = masked_loss(logits, batch.target, batch.mask), self.training_config.loss.jaccard
+        return loss + weight * jaccard_loss(logits, batch.target, batch.mask) if weight else loss
 
     def optimizer(self) -> torch.optim.Optimizer:
         """Make the optimiser that the settings ask for."""
@@ -143,6 +163,21 @@ def masked_loss(logits: Tensor, target: Tensor, mask: Tensor) -> Tensor:
     """
     counted = target.long().masked_fill(mask, _IGNORED)
     return F.cross_entropy(logits.float(), counted, ignore_index=_IGNORED, reduction="sum") / target.numel()
+
+
+def jaccard_loss(logits: Tensor, target: Tensor, mask: Tensor) -> Tensor:
+    """One minus the IoU of probabilities, the mean over the classes that targets show, outside M.
+
+    Logits (B, C, H, W), target (B, H, W) uint8, mask M (B, H, W) bool -> scalar. Intersections and unions are summed
+    over the batch, and one cell is added to both (Rahman and Wang 2016).
+    """
+    counted = ~mask[:, None]
+    probability = logits.float().softmax(dim=1) * counted
+    truth = one_hot(target) * counted
+    both, seen = (probability * truth).sum(dim=(0, 2, 3)), truth.sum(dim=(0, 2, 3))
+    union = probability.sum(dim=(0, 2, 3)) + seen - both
+    present = seen > 0
+    return (present * (1 - (both + 1) / (union + 1))).sum() / present.sum().clamp(min=1)
 
 
 def input_planes(past: Tensor) -> Tensor:

@@ -14,6 +14,7 @@ ENTRY_POINT_GROUP = "semgrid_eval.models"
 _HERE = "semgrid_eval.models"
 MODELS = {
     "ed": f"{_HERE}.encoder_decoder:EncoderDecoder",
+    "residual": f"{_HERE}.residual:Residual",
     "newest": f"{_HERE}.newest:RepeatNewest",
     "overlay": f"{_HERE}.overlay:OverlaySensors",
     "fuse": f"{_HERE}.overlay:FuseAll",

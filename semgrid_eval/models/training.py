@@ -91,6 +91,8 @@ class _Trainer:
     def run(self, store: TrainingFolder, validation: WindowSet | None, progress: Progress) -> list[EpochRecord]:
         """Train from the checkpoint, or from the beginning, to the end."""
         history = store.restore(self._network, self._optimizer)
+        if not history:
+            self._network.prepare(self._windows)
         for epoch in range(len(history), self._config.epochs):
             # Each epoch has a seed of its own, so that no state of a generator needs to be kept.
             with seeded(_epoch_seed(self._seed, epoch), self._device):
@@ -98,7 +100,7 @@ class _Trainer:
                 loss = self._run_epoch(epoch, progress)
                 seconds = round(time.monotonic() - started_s, 3)
             validated = self._validation_loss(validation) if validation else None
-            updates, rate = self._config.updates_until(epoch + 1), self._config.schedule.rate_in(epoch)
+            updates, rate = self._config.updates_until(epoch + 1), self._config.rate_at(self._config.updates_until(epoch), epoch)
             history.append(EpochRecord(epoch + 1, updates, rate, loss, validated, seconds))
             store.keep(self._network, self._optimizer, history)
         store.finish(self._network, history)
@@ -107,8 +109,6 @@ class _Trainer:
     def _run_epoch(self, epoch: int, progress: Progress) -> float:
         """Make the updates of an epoch (counted from 0) and give their mean loss."""
         first, last = self._config.updates_until(epoch), self._config.updates_until(epoch + 1)
-        for group in self._optimizer.param_groups:
-            group["lr"] = self._config.schedule.rate_in(epoch)
         self._network.train()
         generator = torch.Generator().manual_seed(_epoch_seed(self._seed, epoch))
         drawn = draw_windows(len(self._windows), (last - first) * self._config.batch, generator).to(self._device)
@@ -116,6 +116,8 @@ class _Trainer:
         said_s = time.monotonic()
         for done in range(1, last - first + 1):
             chosen = drawn[(done - 1) * self._config.batch : done * self._config.batch]
+            for group in self._optimizer.param_groups:
+                group["lr"] = self._config.rate_at(first + done - 1, epoch)
             total += self._update(self._windows.batch(chosen))
             # Reading the loss waits for the device, so it is not done after each update.
             if done == last - first or time.monotonic() - said_s > _REPORT_INTERVAL_S:

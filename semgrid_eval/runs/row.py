@@ -40,6 +40,9 @@ class Row(Config):
     train_split: str = "train"
     validation_split: str = "val"
     window: WindowConfig = WindowConfig()
+    # Leads to train on, from and to so many frames, where it is not the window's own alone: one training for all rows
+    # that differ in the horizon.
+    train_leads: tuple[int, int] | None = None
     # Where it differs from `window`, for recordings of another frame rate; what a file leaves out is as in `window`,
     # and the number of inputs has to be.
     validation_window: WindowConfig | None = None
@@ -64,6 +67,11 @@ class Row(Config):
             raise ValueError(f"model {self.model!r} is not one of {names} or path.py:Class")
         if self.scored_window.inputs != self.window.inputs:
             raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
+        if self.train_leads and not 1 <= self.train_leads[0] <= self.train_leads[1]:
+            raise ValueError(f"train_leads {list(self.train_leads)} are not frames from and to")
+        reach = self.window.span_frames + max(self.leads_frames, default=0)
+        if self.window.target_frame is not None and reach > self.window.target_frame:
+            raise ValueError(f"train_leads reach back {reach} frames, and target_frame is {self.window.target_frame}")
         if found := self.found_model():
             found.check(found.parse_settings(self.settings), self.given)
         return self
@@ -72,6 +80,11 @@ class Row(Config):
     def scored_window(self) -> WindowConfig:
         """Windows that are scored."""
         return self.validation_window or self.window
+
+    @property
+    def leads_frames(self) -> tuple[int, ...]:
+        """Leads to train on, empty where it is the window's own alone."""
+        return tuple(range(self.train_leads[0], self.train_leads[1] + 1)) if self.train_leads else ()
 
     @property
     def given(self) -> Given:

@@ -35,7 +35,7 @@ from semgrid_eval.windows.data import (
     window_arrays,
 )
 
-WindowPlanner = Callable[[Sequence[int], WindowConfig], WindowPlan]
+WindowPlanner = Callable[[Sequence[int], WindowConfig, Sequence[int]], WindowPlan]
 
 
 @dataclass(eq=False)
@@ -109,13 +109,19 @@ class Worker:
         return job.training.folder / TRAINING_HISTORY_FILE if job.training and is_network else None
 
     def _select(
-        self, data: RunData, row: Row, split: str, config: WindowConfig, plan: WindowPlanner
+        self,
+        data: RunData,
+        row: Row,
+        split: str,
+        config: WindowConfig,
+        plan: WindowPlanner,
+        leads_frames: tuple[int, ...] = (),
     ) -> tuple[WindowSet, dict[int, str]]:
         """Select windows once for all seeds and rows that share them, with the reasons why recordings are too short."""
-        key = (data, grid_digest(row.grid), split, config, row.sensors, row.translate, plan)
+        key = (data, grid_digest(row.grid), split, config, row.sensors, row.translate, plan, leads_frames)
         if key not in self._selected:
             grids = data.data(row.grid, split)
-            planned = plan(grids.frame_counts, config)
+            planned = plan(grids.frame_counts, config, leads_frames)
             windows = select_windows(grids, planned.windows, sensors=row.sensors, translate=row.translate)
             self._selected[key] = windows, planned.too_short
         return self._selected[key]
@@ -125,15 +131,17 @@ class Worker:
 
         So one training serves the scores on all sorts of logs.
         """
-        if self.scored_data is self.training_data:
+        if self.scored_data is self.training_data and not row.train_leads:
             return scored
+        data, split = self.training_data, row.validation_split
         try:
-            return self._select(self.training_data, row, row.validation_split, row.window, validation_windows)[0]
+            return self._select(data, row, split, row.window, validation_windows, row.leads_frames)[0]
         except InputError:  # no such logs among them, and none is needed
             return None
 
     def _training(self, resolved: Resolved, row: Row, seed: int | None, scored: WindowSet) -> Training:
-        windows = self._select(self.training_data, row, row.train_split, row.window, training_windows)[0]
+        data, split = self.training_data, row.train_split
+        windows = self._select(data, row, split, row.window, training_windows, row.leads_frames)[0]
         watched = self._watched(row, scored) if issubclass(resolved.model, Network) else None
         # All that decides what a model learns.
         settings, precision = resolved.settings, ""

@@ -26,9 +26,24 @@ class WindowConfig(Config):
     target_frame: int | None = Field(default=25, ge=0)  # the one target of a validation recording; None takes every one
 
     @property
+    def span_frames(self) -> int:
+        """Frames from the first input to the newest."""
+        return (self.inputs - 1) * self.step_frames
+
+    @property
+    def lead_frames(self) -> int:
+        """Frames from the newest input to the target."""
+        return self.horizon_steps * self.step_frames
+
+    @property
     def reach_frames(self) -> int:
         """Frames from the first input to the target."""
-        return (self.inputs - 1 + self.horizon_steps) * self.step_frames
+        return self.span_frames + self.lead_frames
+
+    def input_frames(self, target: int, lead_frames: int) -> tuple[int, ...]:
+        """Return the frames of the inputs, oldest first, the newest so many frames before the target."""
+        newest = target - lead_frames
+        return tuple(range(newest - self.span_frames, newest + 1, self.step_frames))
 
     @model_validator(mode="after")
     def _inputs_lie_in_recording(self) -> Self:
@@ -57,32 +72,48 @@ class WindowPlan:
     too_short: dict[int, str]
 
 
-def training_windows(frame_counts: Sequence[int], config: WindowConfig) -> WindowPlan:
+def training_windows(
+    frame_counts: Sequence[int], config: WindowConfig, leads_frames: Sequence[int] = ()
+) -> WindowPlan:
     """Return every window of every recording: offsets o with inputs o, o+s, ..., o+(n-1)s and target o+(n-1+h)s.
 
+    With `leads_frames`, frames from the newest input to the target, there are those of each of these leads instead.
+
     Raises:
         InputError: no recording is long enough.
     """
-    targets = [range(config.reach_frames, count) for count in frame_counts]
-    return _plan(frame_counts, targets, config, config.reach_frames + 1)
+    leads = leads_frames or [config.lead_frames]
+    found = [
+        Window(recording, config.input_frames(target, lead), target)
+        for recording, count in enumerate(frame_counts)
+        for lead in leads
+        for target in range(config.span_frames + lead, count)
+    ]
+    return _plan(frame_counts, found, config.span_frames + min(leads) + 1)
 
 
-def validation_windows(frame_counts: Sequence[int], config: WindowConfig) -> WindowPlan:
+def validation_windows(
+    frame_counts: Sequence[int], config: WindowConfig, leads_frames: Sequence[int] = ()
+) -> WindowPlan:
     """Return one window a recording, its target at `target_frame`, which rows of other shapes share (reading 3).
 
+    With `leads_frames`, recordings take one of these leads after the other.
+
     Raises:
         InputError: no recording is long enough.
     """
-    if config.target_frame is None:
-        return training_windows(frame_counts, config)
-    needed = config.target_frame + 1
-    targets = [range(config.target_frame, min(needed, count)) for count in frame_counts]
-    return _plan(frame_counts, targets, config, needed)
+    leads, target = leads_frames or [config.lead_frames], config.target_frame
+    if target is None:
+        return training_windows(frame_counts, config, leads_frames)
+    found = [
+        Window(recording, config.input_frames(target, leads[recording % len(leads)]), target)
+        for recording, count in enumerate(frame_counts)
+        if target < count
+    ]
+    return _plan(frame_counts, found, target + 1)
 
 
-def _plan(
-    frame_counts: Sequence[int], targets: Sequence[Sequence[int]], config: WindowConfig, needed: int
-) -> WindowPlan:
+def _plan(frame_counts: Sequence[int], windows: Sequence[Window], needed: int) -> WindowPlan:
     too_short = {
         recording: f"has {count} frames, and a window needs {needed}"
         for recording, count in enumerate(frame_counts)
@@ -93,12 +124,6 @@ def _plan(
         raise InputError(
             f"a window needs {needed} frames, and the longest of {len(too_short)} recordings has {longest}"
         )
-    reach, step = config.reach_frames, config.step_frames
-    windows = (
-        Window(recording, tuple(range(target - reach, target, step)[: config.inputs]), target)
-        for recording, frames in enumerate(targets)
-        for target in frames
-    )
     return WindowPlan(tuple(windows), too_short)
 
 

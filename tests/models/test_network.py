@@ -1,5 +1,7 @@
 """What all networks share: planes, the masked loss, optimisers and schedules by their settings, probabilities."""
 
+from types import SimpleNamespace
+
 import pytest
 import torch
 from hypothesis import given
@@ -12,7 +14,8 @@ from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.encoder_decoder import EncoderDecoder
-from semgrid_eval.models.network import ScheduleConfig, TrainingConfig, input_planes, masked_loss
+from semgrid_eval.models.model import one_hot
+from semgrid_eval.models.network import ScheduleConfig, TrainingConfig, input_planes, jaccard_loss, masked_loss
 from semgrid_eval.windows.data import Window, select_windows
 from semgrid_eval.windows.grids import stack_recordings
 
@@ -82,9 +85,38 @@ def test_cells_inside_the_mask_get_no_gradient():
 def test_papers_configuration_counts_as_the_readings_say():
     paper = TrainingConfig()
     assert paper.updates_until(40) * paper.batch == 236_800
-    assert [paper.schedule.rate_in(epoch) for epoch in (0, 34, 35, 39)] == [1e-3, 1e-3, 1e-4, 1e-4]
+    assert [paper.rate_at(185 * epoch, epoch) for epoch in (0, 34, 35, 39)] == [1e-3, 1e-3, 1e-4, 1e-4]
     assert TrainingConfig(epoch_unit="windows").updates_until(40) == 231
-    assert ScheduleConfig(drop_epoch=None).rate_in(39) == 1e-3
+    assert TrainingConfig(schedule=ScheduleConfig(drop_epoch=None)).rate_at(39 * 185, 39) == 1e-3
+
+
+def test_a_cosine_rises_to_the_rate_and_falls_as_half_a_wave():
+    schedule = ScheduleConfig(shape="cosine", learning_rate=0.8, warm_up=0.2)
+    config = TrainingConfig(epochs=2, updates_per_epoch=10, schedule=schedule)
+    rates = [config.rate_at(update, update // 10) for update in range(20)]
+    assert rates[:5] == pytest.approx([0.2, 0.4, 0.6, 0.8, 0.8])
+    assert rates[12] == pytest.approx(0.4)
+    assert sorted(rates[4:], reverse=True) == rates[4:]
+    assert 0 < rates[-1] < 0.01
+
+
+def test_jaccard_loss_is_the_share_of_cells_that_both_do_not_have():
+    target = torch.tensor([[[1, 1, 2, 0]]], dtype=torch.uint8)
+    certain = 100 * one_hot(torch.tensor([[[1, 2, 2, 0]]], dtype=torch.uint8))
+    mask = torch.tensor([[[False, False, False, True]]])
+    # Class 1: one of two cells, class 2: one of two; one cell is added to both sides. Class 0 lies inside M.
+    assert jaccard_loss(certain, target, mask).item() == pytest.approx(1 - (1 + 1) / (2 + 1))
+    right = 100 * one_hot(target)
+    assert jaccard_loss(right, target, mask).item() == pytest.approx(0, abs=1e-6)
+
+
+def test_the_loss_of_a_training_is_what_its_settings_ask_for():
+    logits = torch.randn(2, CLASS_COUNT, 4, 4, generator=torch.Generator().manual_seed(0))
+    target = torch.randint(0, CLASS_COUNT, (2, 4, 4), dtype=torch.uint8)
+    batch = SimpleNamespace(target=target, mask=torch.zeros(2, 4, 4, dtype=torch.bool))
+    with_jaccard = network(EncoderDecoder, depth=2, features=4, training={"loss": {"jaccard": 0.5}})
+    expected = masked_loss(logits, target, batch.mask) + 0.5 * jaccard_loss(logits, target, batch.mask)
+    torch.testing.assert_close(with_jaccard.loss(logits, batch), expected)
 
 
 def test_an_epoch_without_a_whole_batch_is_refused():

@@ -28,6 +28,10 @@ _SMALL = ("small_static", "small_dynamic")
 _MEAN = "mean_known"
 _BASELINES = ("BL-DC", "BL-Fuse", "BL-Table", "BL-Flow")
 _HORIZONS = ("DC", "PH1", "PH2", "PH3")
+_RESIDUAL = (
+    *(("RN-DC", other) for other in (*_BASELINES, "ED-DC")),
+    *(("RN-SL5", other) for other in ("BL-Fuse-SL5", "ED-SL5")),
+)
 _BUILD = re.compile(r"ED-d(\d+)-f(\d+)")
 _DEFAULT_ENDS = {"deeper": ("ED-d4-f64", "ED-d2-f64"), "wider": ("ED-d3-f64", "ED-d3-f16")}
 
@@ -78,6 +82,7 @@ def claims(rows: Iterable[str]) -> tuple[Claim, ...]:
         Claim("third-input", third, _each((*_LARGE, *_SMALL), ("ED-SL3", "ED-SL2"), rule="at least")),
         *_horizons(),
         *_builds(builds),
+        *(claim for pair in _RESIDUAL for claim in _residual_over(pair)),
     )
 
 
@@ -138,6 +143,16 @@ def _builds(builds: list[tuple[str, int, int]]) -> tuple[Claim, ...]:
             Claim(f"{kind}-slower", f"A {kind} network is slower", (Check(pairs, WINDOW_MS, "slower"),)),
         ]
     return tuple(found)
+
+
+def _residual_over(pair: Pair) -> tuple[Claim, ...]:
+    """Compare the residual network, which is not the paper's, with what it has to be clear of."""
+    first, second = pair
+    moving = tuple(Check((pair,), score, region="moving") for score in ("vehicles", "person"))
+    return (
+        Claim(f"{first}-{second}", f"{first} is better than {second} in every category", _each((*_LARGE, *_SMALL), pair)),
+        Claim(f"{first}-moving-{second}", f"{first} is better than {second} on moving vehicles and persons alone", moving),
+    )
 
 
 def _each(scores: Iterable[str], pair: Pair, *, rule: Rule = "better") -> tuple[Check, ...]:
