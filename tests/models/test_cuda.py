@@ -64,9 +64,9 @@ def test_answers_are_near_those_of_the_cpu(name):
 def test_trainings_are_near_those_of_the_cpu(name, tmp_path):
     here = trained(name, tmp_path / "cpu", CPU, dropout=False)
     there = trained(name, tmp_path / "cuda", CUDA, dropout=False)
-    torch.testing.assert_close(losses(there), losses(here), rtol=0.02, atol=0.0)
+    torch.testing.assert_close(losses(there), losses(here), rtol=2e-3, atol=0.0)
     mine, theirs = flat_weights(here), flat_weights(there)
-    assert (mine - theirs).norm() < 0.05 * mine.norm()
+    assert (mine - theirs).norm() < 0.01 * mine.norm()
 
 
 @pytest.mark.parametrize("precision", ["float32", "bf16"])
@@ -91,7 +91,7 @@ def test_a_checkpoint_goes_on_on_the_other_device(name, first, second, tmp_path)
         trained(name, tmp_path / "moved", first, stop_after_an_epoch, dropout=False)
     assert not (tmp_path / "moved" / WEIGHTS_FILE).exists()
     moved = trained(name, tmp_path / "moved", second, dropout=False)
-    torch.testing.assert_close(losses(moved), losses(whole), rtol=0.02, atol=0.0)
+    torch.testing.assert_close(losses(moved), losses(whole), rtol=2e-3, atol=0.0)
     assert not (tmp_path / "moved" / CHECKPOINT_FILE).exists()
 
 
