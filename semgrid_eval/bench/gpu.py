@@ -39,7 +39,7 @@ class Size:
     starting_s: float = 25.0  # until all of them have begun
 
 
-SMOKE = Size(4, 2, 64, updates=2, answers=2, sharing=(2,), together_s=1.0, starting_s=4.0)
+SMOKE = Size(features=2, batch=2, matrix_rows=64, updates=1, answers=1, sharing=())
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,20 @@ from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS
 from semgrid_eval.scores.metrics.table import IOU
 
 ORDER = (
-    *("BL-DC", "BL-Fuse", "ED-DC", "Residual-DC", "ED-SL5", "BL-Fuse-SL5", "ED-NT", "BL-NT", "ED-Sp2", "BL-Sp2"),
-    *("ED-PH3", "BL-PH3", "BL-Flow", "BL-Table", "ED-Sp1", "BL-Sp1", "ED-SL3", "ED-PH1", "BL-PH1", "ED-SL4"),
-    *("ED-PH2", "BL-PH2"),
+    *("BL-DC", "BL-Fuse", "ED-DC", "Residual-DC", "ED-SL5", "ED-NT", "ED-Sp2", "ED-PH3", "ED-Sp1", "ED-SL3", "ED-PH1"),
+    *(
+        "ED-SL4",
+        "ED-PH2",
+        "BL-NT",
+        "BL-Sp1",
+        "BL-Sp2",
+        "BL-PH1",
+        "BL-PH2",
+        "BL-PH3",
+        "BL-Fuse-SL5",
+        "BL-Flow",
+        "BL-Table",
+    ),
 )
 """Rows from the one that decides most to the one that decides least; `ED-SL2` is `ED-DC` under another name."""
 AGAINST = ("BL-Fuse", "BL-DC")

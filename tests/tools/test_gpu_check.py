@@ -81,8 +81,7 @@ def test_rates_then_rows_are_measured_scored_and_priced(carried, tmp_path):
     with tarfile.open(tmp_path / "out" / "paper-run.tar.gz") as archive:
         assert "run/run.json" in archive.getnames()
     assert (tmp_path / "out" / "EncoderDecoder.safetensors").is_file()
-    kept = [path for path in (tmp_path / "out").iterdir()]
-    assert len(kept) <= 8
+    assert len(list((tmp_path / "out").iterdir())) <= 8
 
 
 def test_parts_that_fail_or_take_too_long_are_told_and_the_next_begins(tmp_path):
