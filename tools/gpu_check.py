@@ -152,12 +152,15 @@ def run_folder(out: Path) -> Path:
 
 
 def run_parts(chosen: argparse.Namespace) -> bool:
-    """Work on parts one after the other, each in a process that is ended when its time is over; tell if all is well."""
-    well = True
+    """Work on parts one after the other, each in a process that is ended when its time is over; tell if all is well.
+
+    Time that a part leaves is the next one's.
+    """
+    well, ends_s = True, time.monotonic()
     chosen.out.mkdir(parents=True, exist_ok=True)
     for part, budget_s in chosen.part or BUDGET_S.items():
-        started_s = time.monotonic()
-        ended = in_time([*sys.argv[:1], "part", part, *passed_on(chosen)], budget_s)
+        started_s, ends_s = time.monotonic(), ends_s + budget_s
+        ended = in_time([*sys.argv[:1], "part", part, *passed_on(chosen)], max(0.0, ends_s - started_s))
         if part == "paper":
             keep_run(run_folder(chosen.out), chosen.out)
         took_s = time.monotonic() - started_s

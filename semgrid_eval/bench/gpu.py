@@ -35,8 +35,8 @@ class Size:
     updates: int = 60  # in each of three repeats
     answers: int = 100  # of one window, in each of ten repeats, as the paper times
     sharing: tuple[int, ...] = (2, 4)  # processes at once
-    together_s: float = 8.0  # for which they train
-    starting_s: float = 25.0  # until all of them have begun
+    together_s: float = 6.0  # for which they train
+    starting_s: float = 20.0  # until all of them have begun
 
 
 SMOKE = Size(features=2, batch=2, matrix_rows=64, updates=1, answers=1, sharing=())

@@ -47,10 +47,10 @@ def run(rows, grids, out, executor=None):
 
 @pytest.fixture
 def little_memory():
-    """Let this process have 160 MiB of the card at most."""
+    """Let this process have 256 MiB of the card at most."""
     torch.cuda.empty_cache()
     total = torch.cuda.get_device_properties(0).total_memory
-    torch.cuda.set_per_process_memory_fraction((160 << 20) / total)
+    torch.cuda.set_per_process_memory_fraction((256 << 20) / total)
     yield
     torch.cuda.set_per_process_memory_fraction(1.0)
     torch.cuda.empty_cache()
@@ -58,7 +58,7 @@ def little_memory():
 
 @pytest.mark.usefixtures("little_memory")
 def test_a_row_that_does_not_fit_says_so_and_the_others_go_on(grids, tmp_path):
-    large = {"features": 64, "training": {**TRAINING, "batch": 64}}
+    large = {"features": 64, "training": {**TRAINING, "batch": 128}}
     small = {"features": 4, "depth": 2}
     rows = [
         {"name": "large", "model": "ed", "settings": large},

@@ -85,7 +85,7 @@ def test_rates_then_rows_are_measured_scored_and_priced(carried, tmp_path):
 
 
 def test_parts_that_fail_or_take_too_long_are_told_and_the_next_begins(tmp_path):
-    code, printed = check(tmp_path / "nothing", tmp_path, "paper:120", "rates:0.2")
+    code, printed = check(tmp_path / "nothing", tmp_path, "rates:0.2", "paper:120")
     assert code == 1
     assert f"{tmp_path}/nothing/grids" in printed
     assert "== paper: failed" in printed
