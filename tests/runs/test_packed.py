@@ -41,15 +41,13 @@ def test_a_run_on_packed_grids_is_the_run_on_logs(folders, tmp_path):
     assert from_grids.rows == from_logs.rows
     for row in from_grids.rows:
         first, second = (
-            results.read_sums(results.result_folder(tmp_path / out, row.results[0]), "iou", "actors") for out in "ab"
+            results.read_sums(results.result_folder(tmp_path / out, row.results[0]), "iou", "all") for out in "ab"
         )
         assert (first == second).all()
 
 
 def test_processes_read_packed_grids(folders, tmp_path):
-    record = run(
-        [ROWS[0], {**ROWS[0], "name": "other", "translate": False}], folders[1], tmp_path / "run", Processes(2)
-    )
+    record = run([ROWS[0], {"name": "BL-DC", "model": "newest"}], folders[1], tmp_path / "run", Processes(2))
     assert [row.failure for row in record.rows] == [None, None]
 
 
