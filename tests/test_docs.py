@@ -98,7 +98,8 @@ def test_python_of_the_readme_runs(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "page", ["README.md", "ARCHITECTURE.md", "docs/readings.md", "docs/town.md", "reports/README.md"]
+    "page",
+    ["README.md", "ARCHITECTURE.md", "docs/performance.md", "docs/readings.md", "docs/town.md", "reports/README.md"],
 )
 def test_links_and_files_that_a_page_names_exist(page):
     text = (ROOT / page).read_text(encoding="utf-8")

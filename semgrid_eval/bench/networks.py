@@ -48,7 +48,7 @@ def measure_training(settings: Settings, device: torch.device) -> Iterator[Measu
     for features, slow in textbook.items():
         config = EncoderDecoderSettings(features=features)
         rate = _training_rate(config, settings, device)
-        share = rate * _flops_of_an_update(config, settings.batch) / settings.batch / matrix_rate
+        share = rate * flops_of_an_update(config, settings.batch) / settings.batch / matrix_rate
         yield Measurement(f"f {features}, batch {settings.batch}, {name}", rate, "windows/s")
         if dtype is not torch.float32:
             plain = _training_rate(config, settings, device, precision="float32")
@@ -102,7 +102,7 @@ def _matrix_rate(settings: Settings, device: torch.device, dtype: torch.dtype) -
     return 2.0 * settings.matrix_rows**3 / median(seconds[1:])
 
 
-def _flops_of_an_update(config: EncoderDecoderSettings, batch: int) -> float:
+def flops_of_an_update(config: EncoderDecoderSettings, batch: int) -> float:
     """Count the floating-point operations of the network, forward and backward, over one batch."""
     windows = random_windows()
     network = seeded_network(EncoderDecoder, config, GIVEN, seed=0)

@@ -92,7 +92,8 @@ class EncoderDecoder(Network):
 
     def from_planes(self, planes: Tensor) -> Tensor:
         """Score the target from class probabilities: (B, S * T * C, H, W) -> (B, C, H, W) logits."""
-        features, skips = planes, list[Tensor]()
+        features = planes
+        skips: list[Tensor] = []  # `list[Tensor]()` stops torch.compile
         for block in self.encoder:
             features = block(F.max_pool2d(features, 2) if skips else features)
             skips.append(features)

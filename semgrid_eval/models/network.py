@@ -162,7 +162,10 @@ def masked_loss(logits: Tensor, target: Tensor, mask: Tensor) -> Tensor:
     inside M, as the paper's equation does, makes the loss there zero.
     """
     counted = target.long().masked_fill(mask, _IGNORED)
-    return F.cross_entropy(logits.float(), counted, ignore_index=_IGNORED, reduction="sum") / target.numel()
+    # A sum inside CUDA's cross entropy comes in an order that changes from time to time; one after it does not.
+    reduction = "none" if logits.is_cuda else "sum"
+    losses = F.cross_entropy(logits.float(), counted, ignore_index=_IGNORED, reduction=reduction)
+    return losses.sum() / target.numel()
 
 
 def jaccard_loss(logits: Tensor, target: Tensor, mask: Tensor) -> Tensor:

@@ -8,7 +8,15 @@ from torch.nn import functional as F
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.models.flow import MOVABLE
 from semgrid_eval.models.model import Given
-from semgrid_eval.models.network import Network, NetworkSettings, input_planes
+from semgrid_eval.models.network import (
+    LossConfig,
+    Network,
+    NetworkSettings,
+    OptimizerConfig,
+    ScheduleConfig,
+    TrainingConfig,
+    input_planes,
+)
 from semgrid_eval.models.prior import CellPrior
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
@@ -21,6 +29,14 @@ _SHUT = -2.0  # what its gate starts with, before the sigmoid
 class ResidualSettings(NetworkSettings):
     """Settings of an RN; each part can be left out, to see what it is worth."""
 
+    training: TrainingConfig = TrainingConfig(
+        epochs=10,
+        updates_per_epoch=140,
+        batch=8,
+        optimizer=OptimizerConfig(kind="adam"),
+        schedule=ScheduleConfig(learning_rate=2e-3, shape="cosine"),
+        loss=LossConfig(jaccard=1.0),
+    )
     widths: tuple[int, ...] = Field((64, 96, 128, 128), min_length=1, max_length=6)  # channels, each at half the size
     fine: int = Field(24, ge=0, le=256)  # channels at full resolution; 0 leaves that branch out
     prior: bool = True  # whether it adds to the table of `models.prior`

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 import torch
 
@@ -18,6 +19,23 @@ from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.results import LogRecord
 from semgrid_eval.sources.benchmarks import published_fingerprints
 from semgrid_eval.windows.grids import GridData, stack_recordings
+
+
+class GridSource(Protocol):
+    """Where a run's grids come from, and what is known of their logs."""
+
+    failed: dict[str, str]  # reasons, by the paths of logs that gave no grids
+    records: dict[str, LogRecord]  # by the paths of logs
+    log_of: dict[str, str]  # path of the log, by name of the recording
+
+    def prepare(self) -> None:
+        """Make all grids that are needed."""
+
+    def identify(self) -> None:
+        """Fingerprint the logs of benchmarks."""
+
+    def data(self, config: GridConfig, split: str) -> GridData:
+        """Return the grids of all recordings of one split."""
 
 
 class RunData:
@@ -45,7 +63,7 @@ class RunData:
     def prepare(self) -> None:
         """Build all grids of the matrix now, as many logs at once as the executor works on."""
         for config in self._configs.values():
-            self._grids(config)
+            self.grids(config)
 
     def identify(self) -> None:
         """Fingerprint the logs of benchmarks, so that a report can compare them with the published ones."""
@@ -66,7 +84,7 @@ class RunData:
         """
         key = (grid_digest(config), split)
         if key not in self._stacked:
-            data_set = self._grids(config)
+            data_set = self.grids(config)
             chosen = [recording for recording in data_set.recordings if recording.split == split]
             if not chosen:
                 found = ", ".join(sorted({record.split for record in self.records.values()})) or "none"
@@ -78,7 +96,8 @@ class RunData:
             data_set.recordings = [recording for recording in data_set.recordings if recording.split != split]
         return self._stacked[key]
 
-    def _grids(self, config: GridConfig) -> GridDataSet:
+    def grids(self, config: GridConfig) -> GridDataSet:
+        """Return the grids of all recordings, but for those of splits that were asked for by `data` before."""
         key = grid_digest(config)
         if key not in self._sets:
             with self._stage("grids") as progress:

@@ -15,8 +15,9 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.device import choose_device, is_out_of_memory, settle_process
 from semgrid_eval.models.registry import MODELS
 from semgrid_eval.progress import Progress, Stage, silent, silent_stage
-from semgrid_eval.runs.data import RunData
+from semgrid_eval.runs.data import GridSource, RunData
 from semgrid_eval.runs.matrix import Matrix
+from semgrid_eval.runs.packed import PackedGrids, is_packed
 from semgrid_eval.runs.record import Clock, Outcome, run_record
 from semgrid_eval.runs.row import Row, Unit, plan_units
 from semgrid_eval.runs.thumbnails import keep_pictures
@@ -46,6 +47,8 @@ def run_matrix(
     matrix: Matrix, logs: Path, out: Path, options: RunOptions, *, stage: Stage = silent_stage
 ) -> results.RunRecord:
     """Train and score every row; what is done already is kept, a row that fails is noted and the rest goes on.
+
+    `logs` is a folder of logs, or one of grids that `pack_grids` wrote.
 
     Raises:
         InputError: there is no log at all, or the device does not exist.
@@ -113,9 +116,13 @@ def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stag
     device = choose_device(options.device)
     # Where others do the work, the grids here need no room on the device.
     place = device if options.executor.parallel == 1 else torch.device("cpu")
-    made = partial(
-        RunData, cache=options.grids, rows=matrix.rows, executor=options.grid_executor, device=place, stage=stage
-    )
+
+    def made(folder: Path) -> GridSource:
+        if is_packed(folder):
+            return PackedGrids(folder, matrix.rows, place)
+        executor = options.grid_executor
+        return RunData(folder, options.grids, matrix.rows, executor=executor, device=place, stage=stage)
+
     data = made(logs)
     return Worker(
         out=out,

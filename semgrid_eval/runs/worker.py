@@ -20,7 +20,7 @@ from semgrid_eval.models.network import Network, NetworkSettings, seeded_network
 from semgrid_eval.models.registry import find_model, version_of
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage
-from semgrid_eval.runs.data import RunData, grid_digest
+from semgrid_eval.runs.data import GridSource, grid_digest
 from semgrid_eval.runs.job import SCORING_VERSION, Job, Resolved, Training, id_of_windows, target_key, window_records
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
@@ -47,8 +47,8 @@ class Worker:
 
     out: Path  # folder of the run
     trainings: Path  # folder of the trainings
-    training_data: RunData  # the grids to train on
-    scored_data: RunData  # the grids to score on, mostly the same
+    training_data: GridSource  # the grids to train on
+    scored_data: GridSource  # the grids to score on, mostly the same
     device: torch.device  # where models run
     threads: int  # of numeric libraries where the units are worked on, which may be another process
     example_seed: int  # of the results whose predictions are kept for a report's examples
@@ -58,7 +58,7 @@ class Worker:
     _kept: set[str] = field(default_factory=set, init=False)
 
     @property
-    def data(self) -> tuple[RunData, ...]:
+    def data(self) -> tuple[GridSource, ...]:
         """Where grids come from: one folder of logs, or one to train on and one to score on."""
         return tuple(dict.fromkeys((self.training_data, self.scored_data)))
 
@@ -110,7 +110,7 @@ class Worker:
 
     def _select(
         self,
-        data: RunData,
+        data: GridSource,
         row: Row,
         split: str,
         config: WindowConfig,

@@ -152,7 +152,7 @@ def shift_grids(grids: Tensor, shift_cells: Tensor) -> Tensor:
     source = source_row.clamp(0, rows - 1)[..., :, None] * columns + source_column.clamp(0, columns - 1)[..., None, :]
     flat = grids.flatten(-2)
     moved = flat.gather(-1, source.flatten(-2).expand(flat.shape)).reshape(grids.shape)
-    return torch.where(inside, moved, UNKNOWN)
+    return moved.masked_fill_(~inside, UNKNOWN)  # `torch.where` with a number waits for the device
 
 
 def covered_without_truth(aligned: Tensor, target: Tensor) -> Tensor:

@@ -1,0 +1,133 @@
+"""The paper at its own scale: rows in the order that matters, the scores of those that are done, and what all cost."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pandas as pd
+
+from semgrid_eval.config import parse_config
+from semgrid_eval.models.network import TrainingConfig
+from semgrid_eval.models.registry import MODELS
+from semgrid_eval.report.estimates.bootstrap import Estimate, Resampling, RowScores, score_regions
+from semgrid_eval.report.estimates.division import EVERYWHERE
+from semgrid_eval.report.rows.load import Row as ReadRow
+from semgrid_eval.report.rows.load import load_runs
+from semgrid_eval.runs.matrix import Matrix, load_matrix
+from semgrid_eval.runs.row import Row, plan_units
+from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS
+from semgrid_eval.scores.metrics.table import IOU
+
+ORDER = (
+    *("BL-DC", "BL-Fuse", "ED-DC", "RN-DC", "ED-SL5", "ED-NT", "ED-Sp2", "ED-PH3", "ED-Sp1", "ED-SL3", "ED-PH1"),
+    *(
+        "ED-SL4",
+        "ED-PH2",
+        "BL-NT",
+        "BL-Sp1",
+        "BL-Sp2",
+        "BL-PH1",
+        "BL-PH2",
+        "BL-PH3",
+        "BL-Fuse-SL5",
+        "BL-Flow",
+        "BL-Table",
+    ),
+)
+"""Rows from the one that decides most to the one that decides least; `ED-SL2` is `ED-DC` under another name."""
+AGAINST = ("BL-Fuse", "BL-DC")
+"""Baselines that every row is measured against."""
+GOAL_H = 4.0
+REPEATS = 20
+_RESIDUAL = "residual"
+_SMOKE = {"epochs": 1, "updates_per_epoch": 1, "batch": 2}
+
+
+def paper_matrix(*, smoke: bool = False) -> Matrix:
+    """Return `paper` with one repeat, the baselines of `paper-cpu` and, where there is one, a residual network.
+
+    That one is trained as long as the paper's. `smoke` keeps the first three rows, the network as small and trained as
+    little as can be.
+    """
+    paper, scaled = load_matrix("paper"), load_matrix("paper-cpu")
+    rows = {row.name: row for row in (*scaled.rows, *paper.rows) if row in paper.rows or row.facts.baseline}
+    if _RESIDUAL in MODELS:
+        rows["RN-DC"] = Row(name="RN-DC", model=_RESIDUAL)
+    names = [name for name in ORDER if name in rows][: 3 if smoke else None]
+    sized = tuple(_sized(rows[name], smoke=smoke) for name in names)
+    return Matrix(title=paper.title, seed=paper.seed, rows=sized)
+
+
+def _sized(row: Row, *, smoke: bool) -> Row:
+    """Train a network as long as the paper does, once."""
+    settings = dict(row.settings)
+    if "training" in settings:
+        size = _SMOKE if smoke else TrainingConfig().model_dump(include=set(_SMOKE))
+        settings["training"] = settings["training"] | size
+        settings |= {"features": 2} if smoke and "features" in settings else {}
+    return parse_config(Row, row.model_dump(mode="json") | {"settings": settings, "repeats": 1})
+
+
+def scores_of(folder: Path, reference: Path) -> dict[str, dict[str, object]]:
+    """Return scores of the rows that a run has finished, with intervals over recordings, and paired differences.
+
+    `reference` is the folder of the report at a CPU's scale, whose scores are put beside them.
+    """
+    (run,) = load_runs([folder])
+    scaled = _scaled_scores(reference)
+    scores = score_regions([row for row in run.rows if row.results], IOU, EVERYWHERE, Resampling()).get("all", {})
+    rows = {name: _row(entry, scores, scaled.get(name)) for name, entry in scores.items()}
+    failed = {row.name: row.failures[0] for row in run.rows if row.failures and not row.results}
+    return rows | {name: {"failure": reason} for name, reason in failed.items()}
+
+
+def _row(entry: RowScores, scores: Mapping[str, RowScores], scaled: Mapping[str, float] | None) -> dict[str, object]:
+    record, history = entry.results[0].record, entry.results[0].history
+    others = [scores[name] for name in AGAINST if name in scores and name != entry.row.name]
+    return {
+        "what": entry.row.record.label,
+        "train_seconds": record.train_seconds,
+        "updates": None if history is None else int(history["updates"].iloc[-1]),
+        "loss": None if history is None else float(history["loss"].iloc[-1]),
+        "validation_loss": None if history is None else float(history["validation_loss"].iloc[-1]),
+        "parameters": record.parameters,
+        "windows": entry.windows,
+        "scores": {column: _plain(entry.estimate(column)) for column in CATEGORY_COLUMNS},
+        "scores_at_cpu_scale": scaled,
+        "minus": {
+            other.row.name: {column: _plain(entry.minus(other, column)) for column in CATEGORY_COLUMNS}
+            for other in others
+            if other.row.targets == entry.row.targets
+        },
+    }
+
+
+def _plain(estimate: Estimate) -> list[float]:
+    """Return value, low and high, rounded."""
+    return [round(each, 4) for each in (estimate.value, estimate.low, estimate.high)]
+
+
+def _scaled_scores(report: Path) -> dict[str, dict[str, float]]:
+    table = pd.read_csv(report / "summary.csv").pivot_table(index="row", columns="score", values="iou")
+    return {str(name): {c: round(float(row[c]), 4) for c in CATEGORY_COLUMNS} for name, row in table.iterrows()}
+
+
+def price_of_paper(run: Path) -> dict[str, object]:
+    """Estimate the hours of the whole preset on one GPU from what a run has finished, scoring and all else included."""
+    (found,) = load_runs([run])
+    seconds = [each for each in map(_train_seconds, found.rows) if each is not None]
+    if not seconds:
+        return {}
+    rows = [row.model_copy(update={"repeats": REPEATS}) for row in load_matrix("paper").rows]
+    trainings = sum(unit.row.facts.learns for unit in plan_units(rows, 0).values())
+    each_s = found.record.seconds / len(seconds)
+    return {
+        "what": "an estimate: the run's time for each training that it finished, times all trainings of `paper`",
+        "trainings": trainings,
+        "seconds_each": round(each_s, 1),
+        "hours": round(trainings * each_s / 3600, 2),
+        "goal_hours": GOAL_H,
+    }
+
+
+def _train_seconds(row: ReadRow) -> float | None:
+    return row.results[0].record.train_seconds if row.results else None

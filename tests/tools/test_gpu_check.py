@@ -1,0 +1,118 @@
+"""The check on a GPU, reduced to the least of everything and on the CPU."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+import tarfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.recordings import random_recording
+
+from semgrid_eval.files import write_json
+from semgrid_eval.grids.recording import write_recordings
+from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.runs.packed import INDEX_FILE, PackedIndex
+from semgrid_eval.scores.results import LogRecord
+
+TOOL = Path(__file__).parents[2] / "tools" / "gpu_check.py"
+SENSORS = tuple(GridConfig().sensors)
+
+
+@pytest.fixture(scope="module")
+def carried(tmp_path_factory):
+    """What is carried along: grids of two recordings to train on and two to score."""
+    folder, logs = tmp_path_factory.mktemp("carried"), []
+    for seed, split in enumerate(("train", "train", "val", "val")):
+        coarse = random_recording(seed, size=16, sensors=SENSORS, truth=True)
+        fine = {name: np.kron(getattr(coarse, name), np.ones((8, 8), np.uint8)) for name in ("grids", "actors")}
+        recording = replace(coarse, split=split, **fine)
+        write_recordings(folder / "grids" / f"{seed}.npz", [recording])
+        facts = {"name": recording.name, "path": f"{seed}.mcap", "digest": recording.digest}
+        logs.append(LogRecord(**facts, split=split, dataset=recording.dataset))
+    write_json(folder / "grids" / INDEX_FILE, PackedIndex(grid=GridConfig(), logs=tuple(logs)).model_dump(mode="json"))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def tool():
+    spec = importlib.util.spec_from_file_location("gpu_check", TOOL)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["gpu_check"] = module  # dataclasses look for it there
+    spec.loader.exec_module(module)
+    return module
+
+
+def check(carried, out, *parts):
+    """Run parts on the CPU; return the exit code and what is printed."""
+    options = ["--data", carried, "--out", out, "--device", "cpu", "--commit", "abc", "--smoke"]
+    command = [sys.executable, TOOL, "run", *options, *(word for part in parts for word in ("--part", part))]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+def figures(out, part):
+    return json.loads((out / f"{part}.json").read_text())
+
+
+def test_rates_then_rows_are_measured_scored_and_priced(carried, tmp_path):
+    code, printed = check(carried, tmp_path / "out", "rates:300", "paper:300")
+    assert code == 0, printed
+    rates, paper = figures(tmp_path / "out", "rates"), figures(tmp_path / "out", "paper")
+    assert rates["complete"]
+    assert paper["complete"]
+    assert paper["commit"] == "abc"
+    assert rates["figures"]["trained, eager"]["value"] > 0
+    assert list(paper["rows"]) == ["BL-DC", "BL-Fuse", "ED-DC"]
+    row = paper["rows"]["ED-DC"]
+    assert row["updates"] == 1
+    assert row["scores_at_cpu_scale"]["mean_known"] == pytest.approx(0.573, abs=5e-4)
+    value, low, high = row["minus"]["BL-Fuse"]["mean_known"]
+    assert low <= value <= high
+    assert value == pytest.approx(
+        row["scores"]["mean_known"][0] - paper["rows"]["BL-Fuse"]["scores"]["mean_known"][0], abs=2e-4
+    )
+    assert paper["whole_preset"]["trainings"] == 200
+    assert "== paper: complete" in printed
+    assert "whole preset, estimated" in printed
+    with tarfile.open(tmp_path / "out" / "paper-run.tar.gz") as archive:
+        assert "run/run.json" in archive.getnames()
+    assert (tmp_path / "out" / "EncoderDecoder.safetensors").is_file()
+    assert len(list((tmp_path / "out").iterdir())) <= 8
+
+
+def test_parts_that_fail_or_take_too_long_are_told_and_the_next_begins(tmp_path):
+    code, printed = check(tmp_path / "nothing", tmp_path, "rates:0.2", "paper:120")
+    assert code == 1
+    assert f"{tmp_path}/nothing/grids" in printed
+    assert "== paper: failed" in printed
+    assert "== rates: stopped at its time" in printed
+
+
+LOG = """\
+tests/windows/test_cuda.py::test_content_moves_as_on_the_cpu PASSED [ 20%]
+tests/models/test_cuda.py::test_a_checkpoint_goes_on[to cuda-ed] FAILED [ 40%]
+tests/runs/test_cuda.py::test_a_row_that_does_not_fit SKIPPED (torch finds no CUDA device) [ 60%]
+tests/runs/test_cuda.py::test_processes_that_share"""
+
+
+def test_the_outcomes_of_tests_are_read_while_they_run(tool, tmp_path):
+    (tmp_path / "tests.log").write_text(LOG)
+    assert tool.outcomes(tmp_path / "tests.log") == {
+        "tests/windows/test_cuda.py::test_content_moves_as_on_the_cpu": "PASSED",
+        "tests/models/test_cuda.py::test_a_checkpoint_goes_on[to cuda-ed]": "FAILED",
+        "tests/runs/test_cuda.py::test_a_row_that_does_not_fit": "SKIPPED",
+    }
+
+
+@pytest.mark.parametrize(
+    ("alone", "two", "four", "expected"), [(100, 110, 112, 1), (100, 150, 160, 4), (100, 150, 90, 2)]
+)
+def test_rows_are_trained_beside_each_other_where_that_is_faster(tool, tmp_path, alone, two, four, expected):
+    found = {"trained, eager": alone, "trained by 2 processes": two, "trained by 4 processes": four}
+    write_json(tmp_path / "rates.json", {"figures": {what: {"value": value} for what, value in found.items()}})
+    assert tool.processes_at_once(tmp_path / "rates.json") == expected
+    assert tool.processes_at_once(tmp_path / "none.json") == 1

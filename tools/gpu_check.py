@@ -1,0 +1,285 @@
+"""Check semgrid-eval on a GPU, on a machine without a network: tests, rates, and the paper at its own scale.
+
+Example: python tools/gpu_check.py pack CARRY --logs LOGS
+         python tools/gpu_check.py run --data CARRY --out OUT --part tests:90 --part rates:150 --part paper:270
+"""
+
+import argparse
+import os
+import re
+import signal
+import subprocess
+import sys
+import tarfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from shutil import copyfile
+from typing import Any, TypeVar
+
+import torch
+
+from semgrid_eval.bench.gpu import SHARE_GOAL, SMOKE, Size, measure_gpu
+from semgrid_eval.bench.measurement import Measurement
+from semgrid_eval.bench.paper import AGAINST, paper_matrix, price_of_paper, scores_of
+from semgrid_eval.errors import InputError
+from semgrid_eval.executors import Executor, InProcess, Processes, WorkerDied, available_cores
+from semgrid_eval.files import read_json, write_json
+from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.models.checkpoint import WEIGHTS_FILE, read_header
+from semgrid_eval.models.device import choose_device, visible_gpus
+from semgrid_eval.progress import silent_stage
+from semgrid_eval.runs.data import RunData
+from semgrid_eval.runs.packed import pack_grids
+from semgrid_eval.runs.record import machine, versions
+from semgrid_eval.runs.runner import RunOptions, run_matrix
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+ROOT = Path(__file__).resolve().parent.parent
+REFERENCE = ROOT / "reports" / "reference"
+BUDGET_S = {"tests": 90, "rates": 150, "paper": 270}
+"""The parts, and for how many seconds each may work unless it is said otherwise."""
+WORTH_SHARING = 1.15
+"""How many times as fast several processes must train together, that rows are trained beside each other."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """What a part works with, and where it leaves its figures, each time that it has some more."""
+
+    part: str
+    data: Path
+    out: Path
+    device: str
+    commit: str
+    smoke: bool
+
+    def keep(self, *, complete: bool = False, **figures: object) -> None:
+        """Write what is known so far with the card, the versions and the commit that it was measured with."""
+        known = versions()
+        head = {
+            "part": self.part,
+            "commit": self.commit or known.get("semgrid-eval (commit)", "unknown"),
+            "machine": machine(choose_device(self.device), torch.get_num_threads()),
+            "versions": known,
+            "smoke": self.smoke,
+            "complete": complete,
+        }
+        write_json(self.out / f"{self.part}.json", {**head, **figures})
+
+
+def check_tests(place: Place) -> None:
+    """Run the tests that need a CUDA device, and keep the outcome of each."""
+    log = place.out / "tests.log"
+    command = [sys.executable, "-m", "pytest", "-m", "cuda", "-vv", "-rs", "--color=no", "-W", "default"]
+    chosen = ["tests/windows/test_cuda.py", "tests/models/test_cuda.py", "tests/runs/test_cuda.py"]
+    with log.open("w", encoding="utf-8") as stream:
+        tests = subprocess.Popen([*command, *chosen], cwd=ROOT, stdout=stream, stderr=subprocess.STDOUT)
+        while tests.poll() is None:
+            time.sleep(0.5)
+            place.keep(tests=outcomes(log))
+    place.keep(complete=True, tests=outcomes(log))
+    if tests.returncode:
+        raise InputError(f"tests failed, see {log}")
+
+
+def outcomes(log: Path) -> dict[str, str]:
+    """Read the outcome of each test from what pytest has said so far."""
+    text = log.read_text(encoding="utf-8", errors="replace")
+    return dict(re.findall(r"^(tests/\S+?::.+?) (PASSED|FAILED|SKIPPED|ERROR)\b", text, flags=re.MULTILINE))
+
+
+def check_rates(place: Place) -> None:
+    """Measure training and prediction beside the product of matrices."""
+    figures: dict[str, dict[str, object]] = {}
+    failed: list[str] = []
+    for found in measure_gpu(SMOKE if place.smoke else Size(), choose_device(place.device)):
+        if isinstance(found, Measurement):
+            figures[found.what] = {"value": float(f"{found.value:.4g}"), "unit": found.unit}
+        else:
+            failed.append(found)
+        place.keep(figures=figures, failed=failed, share_goal_percent=SHARE_GOAL)
+    place.keep(complete=True, figures=figures, failed=failed, share_goal_percent=SHARE_GOAL)
+
+
+def check_paper(place: Place) -> None:
+    """Train and score the rows of the paper one after the other, the most telling ones first, as long as it may."""
+    matrix = paper_matrix(smoke=place.smoke)
+    count, run = processes_at_once(place.out / "rates.json"), run_folder(place.out)
+
+    def keep(*, complete: bool = False) -> None:
+        place.keep(complete=complete, processes=count, rows=scores_of(run, REFERENCE), whole_preset=price_of_paper(run))
+
+    inner = Processes(count, gpus=visible_gpus()[:1]) if count > 1 else InProcess()
+    options = RunOptions(place.device, run / "grids", "gpu_check.py", executor=Telling(inner, keep), pictures=False)
+    run_matrix(matrix, place.data / "grids", run, options)
+    keep(complete=True)
+
+
+def processes_at_once(rates: Path) -> int:
+    """Choose how many rows to train at once: as many as trained most windows a second, if that is worth while."""
+    figures = read_json(rates)["figures"] if rates.is_file() else {}
+    alone = figures.get("trained, eager", {}).get("value", 0.0)
+    found = {what: figure["value"] for what, figure in figures.items() if what.startswith("trained by ")}
+    counts = {int(match[0]): rate for what, rate in found.items() if (match := re.findall(r"\d+", what))}
+    best = max(counts, key=lambda count: counts[count], default=1)
+    return best if alone and counts.get(best, 0.0) > WORTH_SHARING * alone else 1
+
+
+class Telling:
+    """An executor that tells when the result of each piece of work is kept."""
+
+    def __init__(self, inner: Executor, tell: Callable[[], None]) -> None:
+        self._inner, self._tell = inner, tell
+        self.parallel, self.threads = inner.parallel, inner.threads
+
+    def run(self, function: Callable[[T], R], items: Sequence[T]) -> Iterator[tuple[int, R | WorkerDied]]:
+        """Yield what the other executor yields; whoever asks for the next result has kept the last one."""
+        for result in self._inner.run(function, items):
+            yield result
+            self._tell()
+
+
+PARTS = {"tests": check_tests, "rates": check_rates, "paper": check_paper}
+
+
+def run_folder(out: Path) -> Path:
+    """Where the part `paper` works."""
+    return out.with_name(f"{out.name}-work") / "run"
+
+
+def run_parts(chosen: argparse.Namespace) -> bool:
+    """Work on parts one after the other, each in a process that is ended when its time is over; tell if all is well.
+
+    Time that a part leaves is the next one's.
+    """
+    well, ends_s = True, time.monotonic()
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    for part, budget_s in chosen.part or BUDGET_S.items():
+        started_s, ends_s = time.monotonic(), ends_s + budget_s
+        ended = in_time([*sys.argv[:1], "part", part, *passed_on(chosen)], max(0.0, ends_s - started_s))
+        if part == "paper":
+            keep_run(run_folder(chosen.out), chosen.out)
+        took_s = time.monotonic() - started_s
+        sys.stdout.write(f"\n== {part}: {ended} after {took_s:.0f} s\n{table(chosen.out / f'{part}.json')}\n")
+        sys.stdout.flush()
+        well &= ended != "failed"
+    return well
+
+
+def in_time(arguments: list[str], budget_s: float) -> str:
+    """Run this script again with these arguments, and end it with all that it has started when its time is over."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+    part = subprocess.Popen([sys.executable, *arguments], start_new_session=True, env=environment)
+    try:
+        return "failed" if part.wait(budget_s) else "complete"
+    except subprocess.TimeoutExpired:
+        return "stopped at its time"
+    finally:
+        if part.poll() is None:
+            os.killpg(part.pid, signal.SIGKILL)
+            part.wait()
+
+
+def passed_on(chosen: argparse.Namespace) -> list[str]:
+    """Return the options that each part gets."""
+    options = ["--data", chosen.data, "--out", chosen.out, "--device", chosen.device, "--commit", chosen.commit]
+    return [*map(str, options), *(["--smoke"] if chosen.smoke else [])]
+
+
+def keep_run(run: Path, out: Path) -> None:
+    """Pack the run, so that a report can be made of it elsewhere, and keep the weights of its first network."""
+    for name, parts in {"run": ["run.json", "results"], "windows": ["windows"]}.items():
+        with tarfile.open(out / f"paper-{name}.tar.gz", "w:gz") as archive:
+            for part in parts:
+                if (run / part).exists():
+                    archive.add(run / part, f"run/{part}")
+    finished = sorted((run / "trainings").glob(f"*/{WEIGHTS_FILE}"), key=lambda path: path.stat().st_mtime)
+    for weights in finished[:1]:
+        copyfile(weights, out / f"{read_header(weights)['model']}.safetensors")
+
+
+def table(path: Path) -> str:
+    """Show the figures of a part in a few lines."""
+    if not path.is_file():
+        return "left no figures"
+    found = read_json(path)
+    lines = [f"{found['machine'].get('gpu', 'no GPU')}, torch {found['versions'].get('torch')}, {found['commit']}"]
+    lines += [f"{name} {outcome}" for name, outcome in found.get("tests", {}).items()]
+    lines += [f"{what:60} {each['value']:10.4g} {each['unit']}" for what, each in found.get("figures", {}).items()]
+    lines += [f"not measured: {what}" for what in found.get("failed", [])]
+    lines += [row_line(name, row) for name, row in found.get("rows", {}).items()]
+    if price := found.get("whole_preset"):
+        lines.append(f"whole preset, estimated: {price['hours']} h (goal: under {price['goal_hours']:g} h)")
+    return "\n".join(lines)
+
+
+def row_line(name: str, row: dict[str, Any]) -> str:
+    """Show a row's mean score with its interval and differences."""
+    if "failure" in row:
+        return f"{name:12} failed: {row['failure']}"
+    mean, scaled = row["scores"]["mean_known"], (row["scores_at_cpu_scale"] or {}).get("mean_known")
+    parts = [f"{name:12} {mean[0]:.3f} [{mean[1]:.3f}, {mean[2]:.3f}]", f"at CPU scale {scaled or 'none'}"]
+    found = {other: row["minus"][other]["mean_known"] for other in AGAINST if other in row["minus"]}
+    parts += [f"minus {other} {value:+.3f} [{low:+.3f}, {high:+.3f}]" for other, (value, low, high) in found.items()]
+    return ", ".join([*parts, f"trained {row['train_seconds']} s" if row["train_seconds"] else "not trained"])
+
+
+def pack(chosen: argparse.Namespace) -> None:
+    """Make what is carried: the grids of logs."""
+    rows = paper_matrix().rows
+    workers = Processes(available_cores())
+    cache, cpu = chosen.cache or chosen.out.with_name(f"{chosen.out.name}-cache"), torch.device("cpu")
+    data = RunData(chosen.logs, cache, rows, executor=workers, device=cpu, stage=silent_stage)
+    pack_grids(data, GridConfig(), chosen.out / "grids")
+    size = sum(path.stat().st_size for path in chosen.out.rglob("*") if path.is_file())
+    sys.stdout.write(f"{chosen.out}: {size / 1e6:.1f} MB, {len(data.failed)} logs failed\n")
+
+
+def budget(text: str) -> tuple[str, float]:
+    """Read `PART` or `PART:SECONDS`."""
+    part, _, seconds = text.partition(":")
+    if part not in PARTS:
+        raise argparse.ArgumentTypeError(f"{part!r} is not one of {', '.join(PARTS)}")
+    return part, float(seconds or BUDGET_S[part])
+
+
+def parser() -> argparse.ArgumentParser:
+    """Describe the commands."""
+    top = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = top.add_subparsers(dest="command", required=True)
+    packing = commands.add_parser("pack", help="make the folder to carry along")
+    packing.add_argument("out", type=Path)
+    packing.add_argument("--logs", type=Path, required=True)
+    packing.add_argument("--cache", type=Path, help="folder of grids that are built already")
+    running = commands.add_parser("run", help="work on parts, each for so many seconds")
+    running.add_argument("--part", type=budget, action="append", help="tests, rates or paper, with :SECONDS")
+    one = commands.add_parser("part", help="work on one part without a limit of time")
+    one.add_argument("name", choices=PARTS)
+    for command in (running, one):
+        command.add_argument("--data", type=Path, required=True, help="folder that was carried along")
+        command.add_argument("--out", type=Path, required=True)
+        command.add_argument("--device", default="auto")
+        command.add_argument("--commit", default="", help="of this checkout, where git cannot tell it")
+        command.add_argument("--smoke", action="store_true", help="the least of everything, to try the script itself")
+    return top
+
+
+def main() -> int:
+    """Do what the command line says; 1 where a part failed."""
+    chosen = parser().parse_args()
+    if chosen.command == "pack":
+        pack(chosen)
+    elif chosen.command == "part":
+        place = Place(chosen.name, chosen.data, chosen.out, chosen.device, chosen.commit, chosen.smoke)
+        PARTS[chosen.name](place)
+    else:
+        return 0 if run_parts(chosen) else 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
