@@ -10,6 +10,7 @@ from torch.nn import functional as F
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config
+from semgrid_eval.models.augment import AugmentConfig
 from semgrid_eval.models.device import Precision, choose_precision, seeded
 from semgrid_eval.models.model import Given, Model
 from semgrid_eval.windows.data import WindowBatch
@@ -62,6 +63,7 @@ class TrainingConfig(Config):
     clip_norm: float | None = Field(default=None, gt=0)  # limit of the gradient's norm; the paper has none
     optimizer: OptimizerConfig = OptimizerConfig()
     schedule: ScheduleConfig = ScheduleConfig()
+    augment: AugmentConfig = AugmentConfig()  # of each batch, from the epoch's seed
 
     @model_validator(mode="after")
     def _epoch_holds_a_batch(self) -> Self:

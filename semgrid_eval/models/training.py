@@ -12,6 +12,7 @@ from torch import Tensor
 
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.files import digest_value, locked
+from semgrid_eval.models.augment import augment
 from semgrid_eval.models.checkpoint import EpochRecord, TrainingFolder
 from semgrid_eval.models.device import seeded
 from semgrid_eval.models.network import Network, autocast
@@ -116,7 +117,8 @@ class _Trainer:
         said_s = time.monotonic()
         for done in range(1, last - first + 1):
             chosen = drawn[(done - 1) * self._config.batch : done * self._config.batch]
-            total += self._update(self._windows.batch(chosen))
+            batch, translate = self._windows.batch(chosen), self._windows.translate
+            total += self._update(augment(batch, self._config.augment, generator, translate=translate))
             # Reading the loss waits for the device, so it is not done after each update.
             if done == last - first or time.monotonic() - said_s > _REPORT_INTERVAL_S:
                 loss = total.item() / done
