@@ -14,7 +14,7 @@ from semgrid_eval.sources.town.sensors import cityscapes_camera
 
 _DIGITS = 6  # kept of what is drawn: processors differ in the last bits of an exponential
 _NOISE_PX, _LABEL_PX = "px of an image 2048 px wide", "px of an image 512 px wide"
-_SHARE, _KEPT = "of 1", "of 1 a frame"
+_OF_IMAGE, _KEPT = "of the image", "kept by the next frame"
 
 
 @dataclass(frozen=True)
@@ -49,26 +49,26 @@ RANGES = {
         "white_px": Range(0.12, 0.6, _NOISE_PX),
         "correlation": Range(0.006, 0.02, "widths of the image"),
         "persistence": Range(0.7, 0.97, _KEPT, by_ratio=False),
-        "mismatched": Range(0.003, 0.04, _SHARE),
+        "mismatched": Range(0.003, 0.04, _OF_IMAGE),
         "mismatch_px": Range(3.0, 15.0, _NOISE_PX),
-        "dropout": Range(0.005, 0.12, _SHARE),
-        "far_dropout": Range(0.06, 0.4, _SHARE),
-        "speckle": Range(0.002, 0.05, _SHARE),
-        "fattened": Range(0.2, 0.9, _SHARE, by_ratio=False),
-        "sky": Range(0.0, 0.8, _SHARE, by_ratio=False),
+        "dropout": Range(0.005, 0.12, _OF_IMAGE),
+        "far_dropout": Range(0.06, 0.4, _OF_IMAGE),
+        "speckle": Range(0.002, 0.05, _OF_IMAGE),
+        "fattened": Range(0.2, 0.9, "of the borders", by_ratio=False),
+        "sky": Range(0.0, 0.8, "of the sky", by_ratio=False),
     },
     "label": {
         "warp_px": Range(0.2, 1.0, _LABEL_PX),
         "border_px": Range(1.0, 4.0, _LABEL_PX),
-        "bad_borders": Range(0.03, 0.3, _SHARE),
+        "bad_borders": Range(0.03, 0.3, _OF_IMAGE),
         "confused_px": Range(5.0, 16.0, _LABEL_PX),
-        "confused": Range(0.001, 0.02, _SHARE),
-        "mistaken": Range(0.2, 2.0, "of the shares in noise.py"),
+        "confused": Range(0.001, 0.02, _OF_IMAGE),
+        "mistaken": Range(0.2, 3.0, "of the shares in noise.py"),
         "persistence": Range(0.4, 0.9, _KEPT, by_ratio=False),
         "mistakes_persistence": Range(0.7, 0.97, _KEPT, by_ratio=False),
     },
     "motion": {
-        "speed_scale": Range(0.001, 0.012, _SHARE),
+        "speed_scale": Range(0.001, 0.012, "of the speed"),
         "speed_mps": Range(0.005, 0.06, "m/s"),
         "yaw_rate_bias_radps": Range(0.0002, 0.004, "rad/s"),
         "yaw_rate_radps": Range(0.0005, 0.006, "rad/s"),
