@@ -66,7 +66,7 @@ class Stage:
 
     def pictures(self, others: Snapshot, time_s: float, pose: Pose) -> list[tuple[View, NDArray[np.uint8]]]:
         """Return what each camera sees from a pose of the vehicle, and its colour image (H, W, 3)."""
-        boxes = boxes_of(_in_sight(others, pose, self._widening), time_s)
+        boxes = boxes_of(in_sight(others, pose, self._widening), time_s)
         movers = soup_of_boxes(boxes).moved(-self._place_m[0], -self._place_m[1])
         casters = (self._still_caster, RayCaster(movers.triangles_m))
         soup = Soup.joined([self._still, movers])
@@ -81,7 +81,7 @@ def _is_near(actors: Snapshot, x_m: float, y_m: float) -> NDArray[np.bool_]:
     return np.asarray(np.linalg.norm(actors.centre_m - (x_m, y_m), axis=1) < _SIGHT_M)
 
 
-def _in_sight(actors: Snapshot, pose: Pose, widening: float) -> Snapshot:
+def in_sight(actors: Snapshot, pose: Pose, widening: float) -> Snapshot:
     """Return the actors that may be seen or throw a shadow that is seen."""
     away = actors.centre_m - (pose.x_m, pose.y_m)
     ahead_m = away @ (np.cos(pose.yaw_rad), np.sin(pose.yaw_rad))
