@@ -49,5 +49,6 @@ def _as_json(report: "LogReport") -> dict[str, object]:
         "good": report.good,
         "duration_s": report.duration_s,
         "messages": report.counts,
+        "conditions": {name: each._asdict() for name, each in report.conditions.items()},
         "findings": [asdict(finding) for finding in report.findings],
     }

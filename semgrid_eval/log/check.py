@@ -15,7 +15,7 @@ from semgrid_eval.log import topics
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.png import decode_gray, read_header
-from semgrid_eval.recording.types import CameraCalibration, CameraFrame, MotionSample
+from semgrid_eval.recording.types import CameraCalibration, CameraFrame, MotionSample, Quantity
 
 # What a road vehicle can plausibly do; beyond: a wrong unit or sign, or a broken sensor.
 SPEED_MPS = (-15.0, 70.0)
@@ -57,12 +57,16 @@ class Finding:
 
 @dataclass(frozen=True)
 class LogReport:
-    """What a check found: message counts by topic, the time covered, and findings; a log is good without errors."""
+    """What a check found: message counts by topic, the time covered, and findings; a log is good without errors.
+
+    `conditions` are what the log says of the recording's.
+    """
 
     path: Path
     counts: dict[str, int]
     duration_s: float
     findings: tuple[Finding, ...]
+    conditions: dict[str, Quantity]
 
     @property
     def good(self) -> bool:
@@ -74,9 +78,11 @@ def check_log(path: Path) -> LogReport:
     """Check one log; whatever is wrong with it is a finding, not an exception."""
     findings: list[Finding] = []
     stamps_ns: dict[str, list[int]] = {}
+    conditions: dict[str, Quantity] = {}
     try:
         with LogReader(path) as log:
             log.verify()
+            conditions = log.conditions()
             stamps_ns = log.stamps_ns()
             for finding in _findings(log, stamps_ns):  # one by one: those before damage count as well
                 findings.append(finding)
@@ -85,7 +91,7 @@ def check_log(path: Path) -> LogReport:
     times_ns = [stamp for stamps in stamps_ns.values() for stamp in stamps]
     duration_s = (max(times_ns) - min(times_ns)) / _NS_PER_S if times_ns else 0.0
     counts = {topic: len(stamps) for topic, stamps in sorted(stamps_ns.items())}
-    return LogReport(path, counts, duration_s, tuple(findings))
+    return LogReport(path, counts, duration_s, tuple(findings), conditions)
 
 
 def _findings(log: LogReader, stamps_ns: dict[str, list[int]]) -> Iterator[Finding]:

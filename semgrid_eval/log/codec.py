@@ -5,6 +5,7 @@ Reading a damaged message raises DecodeError.
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import PurePath
 
@@ -26,10 +27,12 @@ from semgrid_eval.log.schemas.actors_pb2 import Actors
 from semgrid_eval.log.schemas.egomotion_pb2 import Egomotion
 from semgrid_eval.log.schemas.stereo_calibration_pb2 import CameraExtrinsics, StereoCalibration
 from semgrid_eval.log.topics import BASE_FRAME, GRID_FRAME, MAP_FRAME, ODOM_FRAME, optical_frame
-from semgrid_eval.recording.types import Actor, CameraCalibration, MotionSample, Pose
+from semgrid_eval.recording.types import Actor, CameraCalibration, MotionSample, Pose, Quantity
 
 RECORD = "semgrid.scene"
 """The metadata record that says what a log is as a whole."""
+CONDITIONS_RECORD = "semgrid.conditions"
+"""The metadata record of a recording's conditions, each as `0.31 px`; only where the source has some to tell."""
 FORMAT_VERSION = 1
 _NS_PER_S = 1_000_000_000
 _GPS_FIELDS = ("latitude_deg", "longitude_deg", "heading_deg")
@@ -82,6 +85,21 @@ class Scene:
         words = {name: given[name] for name in ("name", "dataset", "split", "source_digest")}
         cameras, class_names = (tuple(json.loads(given[name])) for name in ("cameras", "class_names"))
         return cls(**words, cameras=cameras, class_names=class_names, group=given.get("group", ""))
+
+
+def conditions_metadata(conditions: Mapping[str, Quantity]) -> dict[str, str]:
+    """Write the conditions of a recording as entries of a metadata record."""
+    return {name: f"{each.value!r} {each.unit}" for name, each in sorted(conditions.items())}
+
+
+def read_conditions(entries: Mapping[str, str]) -> dict[str, Quantity]:
+    """Read the entries of the metadata record of conditions.
+
+    Raises:
+        ValueError: one does not begin with a number.
+    """
+    parts = {name: text.partition(" ") for name, text in entries.items()}
+    return {name: Quantity(json.loads(value), unit) for name, (value, _, unit) in parts.items()}
 
 
 def timestamp(stamp_ns: int) -> Timestamp:

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple, TypeVar
 
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.log import codec, topics
-from semgrid_eval.log.codec import RECORD, Scene
+from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene
 from semgrid_eval.log.container import Container, damage_as_log_error
 from semgrid_eval.log.topics import camera_topic
-from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose
+from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Quantity
 
 T = TypeVar("T")
 _DECODERS: dict[str, Callable[[bytes], Any]] = {
@@ -61,6 +61,12 @@ class LogReader(Container):
     def start_ns(self) -> int:
         """When the log begins: the time of its first message, 0 where it has none."""
         return min((index.message_start_time for index in self.summary.chunk_indexes), default=0)
+
+    def conditions(self) -> dict[str, Quantity]:
+        """Return what sets the recording apart from others of its data set, by name; nothing where it does not say."""
+        entries = self.metadata(CONDITIONS_RECORD) or {}
+        with damage_as_log_error(self.path):
+            return codec.read_conditions(entries)
 
     def choose_camera(self, wanted: str | None) -> str:
         """Return the camera that is wanted, or the log's only one where none is.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file
-from semgrid_eval.log.codec import RECORD, Scene
+from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene, conditions_metadata
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.writer import MessageWriter, MomentWriter
 from semgrid_eval.recording.types import Moment, Recording
@@ -52,6 +52,8 @@ def write_log(recording: Recording, path: Path) -> None:
     scene = Scene(**same, cameras=tuple(sorted(recording.calibrations)))
     with atomic_file(path) as stream, MessageWriter(stream) as writer:
         writer.metadata(RECORD, scene.to_metadata())
+        if recording.conditions:
+            writer.metadata(CONDITIONS_RECORD, conditions_metadata(recording.conditions))
         for name, data in sorted(recording.source_files.items()):
             media_type = "application/json" if name.endswith(".json") else "application/octet-stream"
             writer.attach(name, media_type, data)
@@ -76,6 +78,7 @@ def read_recording(path: Path) -> Recording:
             source_digest=log.scene.source_digest,
             moments=partial(_moments, path),
             source_files=log.attachments(),
+            conditions=log.conditions(),
         )
 
 

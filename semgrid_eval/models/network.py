@@ -11,6 +11,7 @@ from torch.nn import functional as F
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config
+from semgrid_eval.models.augment import AugmentConfig
 from semgrid_eval.models.device import Precision, choose_precision, seeded
 from semgrid_eval.models.model import Given, Model, one_hot
 from semgrid_eval.windows.data import WindowBatch, WindowSet
@@ -66,6 +67,7 @@ class TrainingConfig(Config):
     optimizer: OptimizerConfig = OptimizerConfig()
     schedule: ScheduleConfig = ScheduleConfig()
     loss: LossConfig = LossConfig()
+    augment: AugmentConfig = AugmentConfig()  # of each batch, from the epoch's seed
 
     @model_validator(mode="after")
     def _epoch_holds_a_batch(self) -> Self:

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.files import digest_value, locked
+from semgrid_eval.models.augment import augment
 from semgrid_eval.models.checkpoint import EpochRecord, TrainingFolder
 from semgrid_eval.models.device import seeded
 from semgrid_eval.models.network import Network, autocast
@@ -116,9 +117,9 @@ class _Trainer:
         said_s = time.monotonic()
         for done in range(1, last - first + 1):
             chosen = drawn[(done - 1) * self._config.batch : done * self._config.batch]
-            for group in self._optimizer.param_groups:
-                group["lr"] = self._config.rate_at(first + done - 1, epoch)
-            total += self._update(self._windows.batch(chosen))
+            self._set_rate(self._config.rate_at(first + done - 1, epoch))
+            batch, translate = self._windows.batch(chosen), self._windows.translate
+            total += self._update(augment(batch, self._config.augment, generator, translate=translate))
             # Reading the loss waits for the device, so it is not done after each update.
             if done == last - first or time.monotonic() - said_s > _REPORT_INTERVAL_S:
                 loss = total.item() / done
@@ -127,6 +128,10 @@ class _Trainer:
                 progress(first + done, self._config.updates_until(self._config.epochs), message)
                 said_s = time.monotonic()
         return total.item() / (last - first)
+
+    def _set_rate(self, learning_rate: float) -> None:
+        for group in self._optimizer.param_groups:
+            group["lr"] = learning_rate
 
     def _update(self, batch: WindowBatch) -> Tensor:
         loss = self._loss(batch)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
+from typing import NamedTuple
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
@@ -95,6 +96,13 @@ class Moment:
     actors: tuple[Actor, ...] | None = None
 
 
+class Quantity(NamedTuple):
+    """A number with its unit in words, `px` or `of 1` (a share)."""
+
+    value: float
+    unit: str
+
+
 @dataclass(frozen=True)
 class Recording:
     """One stretch of driving, streamed moment by moment."""
@@ -106,4 +114,5 @@ class Recording:
     source_digest: str  # digest of everything that determines the content
     moments: Callable[[], Iterator[Moment]]  # starts a new pass over the recording, in the order of time
     source_files: dict[str, bytes] = field(default_factory=dict)  # by attachment name (`front_camera.json`)
+    conditions: dict[str, Quantity] = field(default_factory=dict)  # what sets it apart from others of its data set
     group: str = ""  # the town, city or drive that it belongs to, with other recordings that may depend on it

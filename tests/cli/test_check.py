@@ -51,6 +51,7 @@ def test_json_holds_every_log_with_counts_and_findings(logs, capsys):
     assert (bad["good"], good["good"]) == (False, True)
     assert bad["findings"][0]["severity"] == "error"
     assert good["messages"]["/ego/motion"] == 6
+    assert (bad["conditions"], good["conditions"]) == ({}, {})
     assert {finding["severity"] for finding in good["findings"]} == {"warning"}
 
 

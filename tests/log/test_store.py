@@ -12,8 +12,9 @@ from semgrid_eval.classes import CLASS_NAMES, label_palette
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.log.codec import Scene
 from semgrid_eval.log.reader import LogReader
-from semgrid_eval.log.store import find_logs, write_log
+from semgrid_eval.log.store import find_logs, read_recording, write_log
 from semgrid_eval.recording.png import decode_gray, read_header, with_palette
+from semgrid_eval.recording.types import Quantity
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +36,22 @@ def rewritten(moments):
 
 def test_scene_comes_back(log):
     assert log.scene == Scene("street", "synthetic", "val", ("front",), "d" * 16, CLASS_NAMES)
+
+
+def test_conditions_come_back_exactly_where_there_are_some(log, tmp_path):
+    assert log.conditions() == {}
+    told = {"camera.width_px": Quantity(640, "px"), "label.persistence": Quantity(0.1 + 0.2, "kept by the next frame")}
+    write_log(replace(driving(), conditions=told), tmp_path / "told.mcap")
+    with LogReader(tmp_path / "told.mcap") as reader:
+        assert reader.conditions() == told
+        assert reader.metadata("semgrid.conditions")["camera.width_px"] == "640 px"
+    assert read_recording(tmp_path / "told.mcap").conditions == told
+
+
+def test_conditions_that_are_no_numbers_are_damage(tmp_path):
+    write_log(replace(driving(), conditions={"a": Quantity(float("nan"), "px")}), tmp_path / "a.mcap")
+    with LogReader(tmp_path / "a.mcap") as reader, pytest.raises(LogError, match=r"a\.mcap: is damaged: "):
+        reader.conditions()
 
 
 def test_calibration_comes_back_exactly(log):

@@ -20,6 +20,8 @@ from semgrid_eval.windows.grids import stack_recordings
 CPU = torch.device("cpu")
 QUICK = {"epochs": 3, "updates_per_epoch": 3, "batch": 4, "schedule": {"drop_epoch": 2}, "precision": "float32"}
 
+AUGMENT = {"flip": 0.5, "rotate_deg": 5.0, "misalign_cells": 1}
+
 
 def windows_of(*seeds):
     data = stack_recordings([drifting_blocks(seed) for seed in seeds], cell_m=1.0)
@@ -69,6 +71,17 @@ def test_stopped_training_ends_in_the_same_bytes(tmp_path, epochs):
     assert (straight / WEIGHTS_FILE).read_bytes() == (stopped / WEIGHTS_FILE).read_bytes()
     assert [row[:5] for row in whole.history] == [row[:5] for row in finished.history]
     assert not (stopped / CHECKPOINT_FILE).exists()
+
+
+def test_a_stopped_training_on_changed_batches_ends_in_the_same_bytes(tmp_path):
+    straight, stopped, plain = tmp_path / "straight", tmp_path / "stopped", tmp_path / "plain"
+    quick(straight, augment=AUGMENT)
+    with pytest.raises(KeyboardInterrupt):
+        quick(stopped, augment=AUGMENT, progress=StopAfter(2))
+    quick(stopped, augment=AUGMENT)
+    quick(plain)
+    weights = [(folder / WEIGHTS_FILE).read_bytes() for folder in (straight, stopped, plain)]
+    assert weights[0] == weights[1] != weights[2]
 
 
 def test_seed_decides_weights(tmp_path):

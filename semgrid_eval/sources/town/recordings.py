@@ -4,7 +4,7 @@ import importlib.util
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -15,12 +15,17 @@ from semgrid_eval.progress import Progress
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town.drives import choose_drives
 from semgrid_eval.sources.town.kinds import KINDS
-from semgrid_eval.sources.town.rendering import RecordingPlan
+from semgrid_eval.sources.town.rendering import CONDITIONS, RecordingPlan
 from semgrid_eval.sources.town.town import TownSpec, load_town, prepare_town
+from semgrid_eval.sources.town.varied import draw_conditions
 
 _STEREO = (
     "Errors of labels, disparity and motion: drawn from a model; or disparity from matching a rendered stereo pair; "
     "or none."
+)
+_ERRORS = (
+    "Camera and strength of errors: the same in all recordings, or drawn for each; width and height then say how many "
+    "pixels images have about."
 )
 _VAL_TOWNS = "Towns for validation, if it is another share than of the recordings."
 _TOWN_SIZE = "Side of the square that streets cover."
@@ -44,6 +49,7 @@ class SyntheticConfig(Config):
     width: Annotated[int, Field(ge=64, le=4096, description="Width of the images in pixels.")] = 512
     height: Annotated[int, Field(ge=32, le=2048, description="Height of the images in pixels.")] = 256
     stereo: Annotated[Stereo, Field(description=_STEREO)] = "modelled"
+    errors: Annotated[Literal["fixed", "varied"], Field(description=_ERRORS)] = "fixed"
 
     @model_validator(mode="after")
     def _splits_need_towns(self) -> Self:
@@ -124,7 +130,7 @@ def _plans_of_town(config: SyntheticConfig, share: _Share, folder: Path, first: 
     spec = share.town
     traffic = load_town(folder).traffic
     drives = choose_drives(traffic, share.recordings, np.random.default_rng([spec.seed, spec.index, 1]))
-    return [
+    plans = [
         RecordingPlan(
             name=f"town{spec.index:02d}_{first + position:06d}_000000",
             split=share.split,
@@ -138,3 +144,11 @@ def _plans_of_town(config: SyntheticConfig, share: _Share, folder: Path, first: 
         )
         for position, chosen in enumerate(drives)
     ]
+    return plans if config.errors == "fixed" else [_varied(plan) for plan in plans]
+
+
+def _varied(plan: RecordingPlan) -> RecordingPlan:
+    """Draw the conditions of a recording, which leaves all its other random numbers alone."""
+    rng = np.random.default_rng(plan.seed).spawn(CONDITIONS + 1)[CONDITIONS]
+    drawn = draw_conditions(plan.width_px, plan.height_px, rng)
+    return replace(plan, drawn=drawn, width_px=drawn.width_px, height_px=drawn.height_px)

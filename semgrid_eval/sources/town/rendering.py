@@ -12,21 +12,26 @@ from numpy.typing import NDArray
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.recording.types import Actor, Moment, MotionSample, Pose, Recording
+from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town import drives
 from semgrid_eval.sources.town.bodies import actor_ids, boxes_of, heights_m
 from semgrid_eval.sources.town.rig import Rig
-from semgrid_eval.sources.town.sensors import Camera, RayCaster, View, cityscapes_camera, look
+from semgrid_eval.sources.town.sensors import Camera, RayCaster, View, look
 from semgrid_eval.sources.town.shading import Painter, Sunlight, draw_sunlight
 from semgrid_eval.sources.town.solids import Soup, soup_of_boxes
 from semgrid_eval.sources.town.town import Town, load_town
 from semgrid_eval.sources.town.traffic import ROAD_USERS, Snapshot
+from semgrid_eval.sources.town.varied import Conditions, fixed_conditions
 
 _SIGHT_M = 160.0
-_BEHIND_M, _ASIDE_M, _WIDENING = 9.0, 9.0, 0.55  # includes what throws shadows into the picture
+_BEHIND_M, _ASIDE_M = 9.0, 9.0  # includes what throws shadows into the picture, likewise what follows
+_WIDENING, _WIDENING_BEYOND = 0.55, 0.065  # aside for each metre ahead: at least, and beyond what a camera sees
 CAMERA_NAME = "front"
 RENDER_VERSION = 2
 """Counts changes to what a plan renders to; logs of another version are rendered again."""
 STAMP_JITTER_S = 0.001
+CONDITIONS = 4
+"""Which child of a recording's generator draws its conditions; those before are for what follows in `_moments`."""
 
 
 class Stage:
@@ -35,8 +40,16 @@ class Stage:
     Its frame is the map frame with the origin moved to that place.
     """
 
-    def __init__(self, town: Town, cameras: Sequence[Camera], sunlight: Sunlight, place_m: tuple[float, float]) -> None:
-        self._place_m = place_m
+    def __init__(
+        self,
+        town: Town,
+        cameras: Sequence[Camera],
+        sunlight: Sunlight,
+        place_m: tuple[float, float],
+        widening: float = _WIDENING,
+    ) -> None:
+        """Prepare a place; road users are shown up to `widening` metres aside for each metre ahead."""
+        self._place_m, self._widening = place_m, widening
         self._ground = town.scene.ground
         self._traffic = town.traffic
         corners = town.scene.soup.triangles_m[:, 0, :2]
@@ -53,7 +66,7 @@ class Stage:
 
     def pictures(self, others: Snapshot, time_s: float, pose: Pose) -> list[tuple[View, NDArray[np.uint8]]]:
         """Return what each camera sees from a pose of the vehicle, and its colour image (H, W, 3)."""
-        boxes = boxes_of(_in_sight(others, pose), time_s)
+        boxes = boxes_of(in_sight(others, pose, self._widening), time_s)
         movers = soup_of_boxes(boxes).moved(-self._place_m[0], -self._place_m[1])
         casters = (self._still_caster, RayCaster(movers.triangles_m))
         soup = Soup.joined([self._still, movers])
@@ -68,12 +81,12 @@ def _is_near(actors: Snapshot, x_m: float, y_m: float) -> NDArray[np.bool_]:
     return np.asarray(np.linalg.norm(actors.centre_m - (x_m, y_m), axis=1) < _SIGHT_M)
 
 
-def _in_sight(actors: Snapshot, pose: Pose) -> Snapshot:
+def in_sight(actors: Snapshot, pose: Pose, widening: float) -> Snapshot:
     """Return the actors that may be seen or throw a shadow that is seen."""
     away = actors.centre_m - (pose.x_m, pose.y_m)
     ahead_m = away @ (np.cos(pose.yaw_rad), np.sin(pose.yaw_rad))
     left_m = away @ (-np.sin(pose.yaw_rad), np.cos(pose.yaw_rad))
-    return actors.where((ahead_m > -_BEHIND_M) & (np.abs(left_m) < _ASIDE_M + _WIDENING * np.maximum(ahead_m, 0.0)))
+    return actors.where((ahead_m > -_BEHIND_M) & (np.abs(left_m) < _ASIDE_M + widening * np.maximum(ahead_m, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -88,34 +101,42 @@ class RecordingPlan:
     seed: tuple[int, ...]  # of the recording's random numbers
     width_px: int  # of the images
     height_px: int  # of the images
-    stereo: str  # `modelled`, `matched`, or `exact` for perfect labels, disparity and motion
+    stereo: Stereo  # `modelled`, `matched`, or `exact` for perfect labels, disparity and motion
     dataset: str = "synthetic"  # named in the log
+    drawn: Conditions | None = None  # where recordings vary; else the camera is Cityscapes' and errors are the usual
 
     @property
     def digest(self) -> str:
         """Digest of everything that determines the content."""
         return digest_value({"plan": self.description(), "version": RENDER_VERSION})
 
+    @property
+    def conditions(self) -> Conditions:
+        """The camera, and how strong errors are."""
+        return self.drawn or fixed_conditions(self.width_px, self.height_px)
+
     def description(self) -> dict[str, object]:
         """Return the plan as JSON values, without the place of the town on this machine."""
         values = asdict(self)
         del values["town"]
+        if self.drawn is None:  # so that logs that do not vary stay what they are
+            del values["drawn"]
         return {**values, "seed": list(self.seed)}
 
 
 def render_recording(plan: RecordingPlan) -> Recording:
     """Return the recording of a plan; frames are rendered one by one as they are asked for."""
-    calibration = cityscapes_camera(plan.width_px, plan.height_px)
     description = json.dumps(plan.description(), indent=2, sort_keys=True) + "\n"
     return Recording(
         name=plan.name,
         dataset=plan.dataset,
         split=plan.split,
         group=plan.name.partition("_")[0],  # the town: town03
-        calibrations={CAMERA_NAME: calibration},
+        calibrations={CAMERA_NAME: plan.conditions.calibration},
         source_digest=plan.digest,
         moments=partial(_moments, plan),
         source_files={"plan.json": description.encode()},
+        conditions=plan.drawn.quantities(plan.stereo) if plan.drawn else {},
     )
 
 
@@ -123,14 +144,14 @@ def _moments(plan: RecordingPlan) -> Iterator[Moment]:
     town = load_town(plan.town)
     path = drives.ego_path(town.traffic, plan.drive)
     assert path is not None, "a plan's drive was checked when it was chosen"
-    stamps, reports, light, errors = np.random.default_rng(plan.seed).spawn(4)
+    stamps, reports, light, errors = np.random.default_rng(plan.seed).spawn(CONDITIONS)
     times_s = plan.drive.start_s + np.arange(drives.FRAME_COUNT) / drives.FRAME_RATE_HZ
     times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, drives.FRAME_COUNT - 1))
-    motion_noise = drives.EXACT_MOTION if plan.stereo == "exact" else drives.MotionNoise()
+    motion_noise = drives.EXACT_MOTION if plan.stereo == "exact" else plan.conditions.motion
     reported = drives.report(path, times_s, motion_noise, reports)
-    camera = Camera(cityscapes_camera(plan.width_px, plan.height_px), plan.width_px, plan.height_px)
-    rig = Rig(camera, plan.stereo, errors)
-    stage = Stage(town, rig.cameras, draw_sunlight(light), path.at(float(times_s[0]))[:2])
+    rig = Rig(plan.conditions, plan.stereo, errors)
+    widening = max(_WIDENING, plan.conditions.side_slope + _WIDENING_BEYOND)
+    stage = Stage(town, rig.cameras, draw_sunlight(light), path.at(float(times_s[0]))[:2], widening)
     for time_s, told in zip(times_s, _rounded(reported), strict=True):
         stamp_ns = round(float(time_s) * 1e9)
         pose = Pose(stamp_ns, *_rounded(np.array(path.at(float(time_s))[:3])))

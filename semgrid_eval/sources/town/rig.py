@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from semgrid_eval.recording.png import encode
 from semgrid_eval.recording.types import CameraFrame
-from semgrid_eval.sources.town.noise import DisparityErrors, DisparityNoise, LabelErrors, LabelNoise
+from semgrid_eval.sources.benchmarks import Stereo
+from semgrid_eval.sources.town.noise import DisparityErrors, LabelErrors
 from semgrid_eval.sources.town.sensors import Camera, View
+from semgrid_eval.sources.town.varied import Conditions
 
 NEAREST_M = 3.0
 """What is nearer than this is not matched."""
@@ -78,11 +80,11 @@ class Rig:
     Disparity is `modelled` or `matched`; where stereo is `exact`, neither disparity nor labels have errors.
     """
 
-    def __init__(self, camera: Camera, stereo: str, rng: np.random.Generator) -> None:
+    def __init__(self, conditions: Conditions, stereo: Stereo, rng: np.random.Generator) -> None:
         disparities, labels = rng.spawn(2)
-        self._camera = camera
-        self._labels = None if stereo == "exact" else LabelErrors(LabelNoise(), labels)
-        self._errors = DisparityErrors(DisparityNoise(), disparities) if stereo == "modelled" else None
+        self._camera = camera = Camera(conditions.calibration, conditions.width_px, conditions.height_px)
+        self._labels = None if stereo == "exact" else LabelErrors(conditions.label, labels)
+        self._errors = DisparityErrors(conditions.disparity, disparities) if stereo == "modelled" else None
         self._matcher = StereoMatcher(camera, disparities) if stereo == "matched" else None
 
     @property

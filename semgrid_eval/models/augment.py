@@ -1,0 +1,103 @@
+"""Augmentation of training batches: scenes are mirrored and turned as a whole, inputs moved off their place."""
+
+import math
+from dataclasses import replace
+
+import torch
+from pydantic import Field
+from torch import Tensor
+
+from semgrid_eval.classes import UNKNOWN
+from semgrid_eval.config import Config
+from semgrid_eval.windows.data import WindowBatch
+from semgrid_eval.windows.grids import covered_without_truth, shift_grids
+
+
+class AugmentConfig(Config):
+    """What is done to a batch before the network trains on it; by default nothing."""
+
+    flip: float = Field(default=0.0, ge=0.0, le=1.0)  # share of the windows that are mirrored, left for right
+    rotate_deg: float = Field(default=0.0, ge=0.0, le=45.0)  # a window is turned by up to this much to either side
+    misalign_cells: int = Field(default=0, ge=0, le=16)  # an input is moved by up to this much along rows and columns
+
+
+def augment(batch: WindowBatch, config: AugmentConfig, generator: torch.Generator, *, translate: bool) -> WindowBatch:
+    """Change a batch by chance: inputs, target, shifts and M stay consistent, on the device where they are.
+
+    Args:
+        batch: what the network would see.
+        config: what is done to it; with the default nothing is drawn.
+        generator: draws on the CPU, so that devices agree.
+        translate: whether the batch's inputs are moved into the target's place already.
+    """
+    if config == AugmentConfig():
+        return batch
+    windows, inputs = batch.lead_s.shape
+    if config.flip:
+        batch = flipped(batch, torch.rand(windows, generator=generator) < config.flip)
+    if config.rotate_deg:
+        share = 2.0 * torch.rand(windows, generator=generator, dtype=torch.float64) - 1.0
+        batch = rotated(batch, share * math.radians(config.rotate_deg))
+    if config.misalign_cells:
+        most = config.misalign_cells
+        batch = misaligned(batch, torch.randint(-most, most + 1, (windows, inputs, 2), generator=generator))
+    aligned = batch.past if translate else shift_grids(batch.past, batch.shift_cells[:, None])
+    return replace(batch, mask=covered_without_truth(aligned, batch.target))
+
+
+def flipped(batch: WindowBatch, chosen: Tensor) -> WindowBatch:
+    """Mirror the chosen windows (B,) left for right; M is left as it was."""
+    chosen = chosen.to(batch.target.device)
+    past = torch.where(chosen[:, None, None, None, None], batch.past.flip(-1), batch.past)
+    target = torch.where(chosen[:, None, None], batch.target.flip(-1), batch.target)
+    sign = torch.stack([torch.ones_like(chosen, dtype=torch.int64), 1 - 2 * chosen.long()], dim=-1)
+    return replace(batch, past=past, target=target, shift_cells=batch.shift_cells * sign[:, None])
+
+
+def rotated(batch: WindowBatch, angle_rad: Tensor) -> WindowBatch:
+    """Turn windows, each by its angle (B,), to the left about the middle of the grid's lower edge; M is left as it was.
+
+    There the paper's grid has the vehicle. Cells take the class of the cell that their centres come from, or are
+    unknown where that lies outside.
+    """
+    device = batch.target.device
+    cos, sin = angle_rad.cos().float().to(device), angle_rad.sin().float().to(device)
+    rows, columns = batch.target.shape[-2:]
+    source = _turned_from(cos, sin, rows, columns)
+    row_shift, column_shift = batch.shift_cells.float().unbind(-1)  # (B, T) each
+    cos, sin = cos[:, None], sin[:, None]
+    turned = torch.stack([cos * row_shift - sin * column_shift, sin * row_shift + cos * column_shift], dim=-1)
+    return replace(
+        batch,
+        past=_gathered(batch.past, source[:, None, None]),
+        target=_gathered(batch.target, source),
+        shift_cells=turned.round().long(),
+    )
+
+
+def misaligned(batch: WindowBatch, moved_cells: Tensor) -> WindowBatch:
+    """Move each input by whole cells (B, T, 2) down and right, and nothing else; M is left as it was.
+
+    That is what errors of the egomotion do: `shift_cells` stay what was reported. Sensors move together.
+    """
+    moved_cells = moved_cells.to(batch.past.device)
+    return replace(batch, past=shift_grids(batch.past, moved_cells[:, None]))
+
+
+def _turned_from(cos: Tensor, sin: Tensor, rows: int, columns: int) -> Tensor:
+    """Return the flat index of the cell that each cell takes its class from, -1 outside: (B,) -> (B, H, W)."""
+    middle_row, middle_column = rows - 0.5, columns / 2.0 - 0.5
+    down = (torch.arange(rows, device=cos.device) - middle_row)[:, None]
+    right = (torch.arange(columns, device=cos.device) - middle_column)[None]
+    cos, sin = cos[:, None, None], sin[:, None, None]
+    row = torch.floor(cos * down + sin * right + middle_row + 0.5).long()
+    column = torch.floor(cos * right - sin * down + middle_column + 0.5).long()
+    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    return torch.where(inside, row * columns + column, -1)
+
+
+def _gathered(grids: Tensor, source: Tensor) -> Tensor:
+    """Take the classes of other cells of the same grid, unknown from -1: (..., H, W) by (..., H, W)."""
+    flat, index = grids.flatten(-2), source.expand(grids.shape).flatten(-2)
+    taken = flat.gather(-1, index.clamp(min=0)).masked_fill(index < 0, UNKNOWN)
+    return taken.reshape(grids.shape)
