@@ -91,8 +91,14 @@ def _nearness(row: Row, other: Row) -> tuple[bool, ...]:
 
 
 def settings_of(row: Row) -> Mapping[str, object]:
-    """Return all that determined a row's numbers, nested settings under dotted names."""
-    return row.results[0].settings
+    """Return all that determined a row's numbers, nested settings under dotted names.
+
+    Sensors that neither its inputs nor its target use are left out: a grid may list more than a row needs.
+    """
+    found = row.results[0].settings
+    used = {*row.record.facts.sensors, *found.get("grid.target", ())}
+    unused = {key for key in found if key.startswith("grid.sensors.") and key.split(".")[2] not in used}
+    return {key: value for key, value in found.items() if key not in unused}
 
 
 def changed_settings(before: Mapping[str, object], after: Mapping[str, object]) -> dict[str, str]:
