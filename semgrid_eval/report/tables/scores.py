@@ -194,7 +194,7 @@ def _known_cell(row: Row, base: Row) -> Cell:
 
 
 def known_m2(row: Row) -> float:
-    """Return the mean area in square metres that is known in a target, NaN where a row does not tell its cells' size."""
+    """Return the mean area that is known in a target in square metres, NaN where the size of cells is not told."""
     grid = row.results[0].grid
     if grid is None:
         return np.nan
