@@ -16,6 +16,7 @@ from semgrid_eval.report.rows.pairing import (
     settings_of,
     shared_windows,
 )
+from semgrid_eval.report.tables.disturbances import disturbance_table
 from semgrid_eval.report.tables.numbers import ABSENT, MINUS, interval_phrase, number, plural
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, plain_table
 from semgrid_eval.report.tables.values import difference_table, run_differences, side_by_side, value_table
@@ -44,6 +45,7 @@ def score_tables(scores: Scores, tags: Sequence[str]) -> dict[str, Table | None]
         "class_differences": difference_table("class-differences", _to_baseline("class"), scores, CLASS_NAMES),
         "classes": value_table("classes", _CLASSES, scores, CLASS_NAMES, beside_paper=True),
         "changes": changes_table(scores),
+        "disturbances": disturbance_table(scores),
         "not_compared": not_compared_table(scores),
         "merged": value_table("merged", _MERGED, scores, MERGED_COLUMNS),
         "runs": run_differences("runs", in_runs, scores, DIFFERENCE_COLUMNS),
