@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -85,6 +85,22 @@ def strictly(model: type[C], value: object) -> C:
     JSON is the strict border: it allows lists for tuples and names for enums, and nothing else that YAML guesses.
     """
     return model.model_validate_json(json.dumps(value, default=str))
+
+
+def of_kind(value: object, kinds: Mapping[str, type[BaseModel]], default: str | None = None) -> object:
+    """Validate a mapping against the class that its key `kind` names, or `default` where it has none.
+
+    For a field of which several classes are possible; what is not a mapping is left for pydantic to judge.
+    """
+    if not isinstance(value, Mapping):
+        return value
+    kind = value.get("kind", default)
+    if kind not in tuple(kinds):
+        raise ValueError(f"kind {kind!r} is not one of {', '.join(kinds)}")
+    config = kinds[kind]
+    if unknown := [key for key in value if key not in config.model_fields]:
+        raise ValueError(f"unknown key {unknown[0]!r}; allowed here: {', '.join(sorted(config.model_fields))}")
+    return strictly(config, value)
 
 
 def parse_config(model: type[C], value: object, *, path: Path | str | None = None) -> C:

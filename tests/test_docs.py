@@ -20,22 +20,25 @@ from semgrid_eval.windows.data import WindowBatch
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+EXPERIMENTS = [(ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("remedies", "disturbances")]
 
 
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+def blocks(language, page=README):
+    return re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL)
 
 
 def commands():
-    lines = [line.partition("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
-    return [line for line in lines if line.startswith("semgrid-eval ")]
+    shown = [block for page in (README, *EXPERIMENTS) for block in blocks("sh", page)]
+    lines = [line.partition("#")[0].strip() for block in shown for line in block.splitlines()]
+    return list(dict.fromkeys(line for line in lines if line.startswith("semgrid-eval ")))
 
 
 @pytest.fixture
 def workplace(tmp_path, monkeypatch):
     """Everything that README's commands take as given."""
     monkeypatch.chdir(tmp_path)
-    for folder in ("SRC", "PREDICTIONS", "logs/val", "recordings", "runs/first", "runs/paper/trainings"):
+    folders = ("SRC", "PREDICTIONS", "logs/val", "recordings", "runs/first", "runs/paper/trainings")
+    for folder in (*folders, "LOGS/val", "RUN", "TREE/pred_sequence"):
         Path(folder).mkdir(parents=True)
     for file in ("logs/val/a.mcap", "network.onnx"):
         Path(file).touch()
@@ -61,6 +64,13 @@ def test_matrices_of_the_readme_load(workplace):
             Path("m.yaml").write_text(block)
             loaded += len(load_matrix("m.yaml").rows)
     assert loaded == 12
+
+
+@pytest.mark.parametrize("page", EXPERIMENTS, ids=lambda page: page.partition("\n")[0])
+def test_matrices_of_experiments_load(workplace, page):
+    for block in blocks("yaml", page):
+        Path("m.yaml").write_text(block)
+        assert load_matrix("m.yaml").rows
 
 
 def own_batch():
@@ -99,7 +109,10 @@ def test_python_of_the_readme_runs(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     "page",
-    ["README.md", "ARCHITECTURE.md", "docs/performance.md", "docs/readings.md", "docs/town.md", "reports/README.md"],
+    [
+        *("README.md", "ARCHITECTURE.md", "reports/README.md"),
+        *("docs/performance.md", "docs/readings.md", "docs/town.md", "docs/remedies.md", "docs/disturbances.md"),
+    ],
 )
 def test_links_and_files_that_a_page_names_exist(page):
     text = (ROOT / page).read_text(encoding="utf-8")

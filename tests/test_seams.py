@@ -1,7 +1,7 @@
 """The test of the house: what is new is one file and one line in a table, and the floors above find it.
 
-A source, a kind of sensor, a baseline, a trained network with a loss of its own, a metric and a region of cells are
-added here, each in a file of its own; the commands then convert, run and report them.
+A source, a kind of sensor, a disturbance, a baseline, a trained network with a loss of its own, a metric and a region
+of cells are added here, each in a file of its own; the commands then convert, run and report them.
 """
 
 import importlib
@@ -19,6 +19,7 @@ from semgrid_eval.scores.metrics.table import METRICS
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.sensors.kinds import KINDS
 from semgrid_eval.sources.known import SOURCES, Known
+from semgrid_eval.windows.disturb.kinds import KINDS as DISTURBANCES
 
 FILES = {
     "seam_source": """
@@ -75,6 +76,26 @@ def read(log, sensors, class_by_label):
 
 KIND = Kind(Kerb, read)
 ''',
+    "seam_disturbance": """
+from dataclasses import replace
+from typing import Literal
+
+from semgrid_eval.windows.disturb.disturbance import Disturbance
+
+
+class Fog(Disturbance):
+    kind: Literal["fog"] = "fog"
+    strength: int = 96
+
+    @property
+    def words(self):
+        return f"nothing seen in {self.strength} rows"
+
+    def apply(self, inputs):
+        grids = inputs.grids.clone()
+        grids[..., : self.strength, :] = 0
+        return replace(inputs, grids=grids)
+""",
     "seam_baseline": """
 from semgrid_eval import Baseline, one_hot
 
@@ -166,6 +187,7 @@ MATRIX = {
         {"name": "newest", "model": "newest"},
         {"name": "oldest", "model": "oldest"},
         {"name": "kerb", "model": "fuse", "sensors": ["full", "kerb"]},
+        {"name": "fog", "model": "newest", "disturb": {"kind": "fog"}},
         {"name": "tiny-w{settings.width}", "model": "tiny", "axes": {"grid": {"settings.width": [2, 4]}}},
     ],
 }
@@ -180,6 +202,7 @@ def added(tmp_path, monkeypatch):
         (tmp_path / f"{name}.py").write_text(text)
     monkeypatch.setitem(SOURCES, "lane", Known("seam_source:SOURCE"))
     monkeypatch.setitem(KINDS, "kerb", importlib.import_module("seam_sensor").KIND)
+    monkeypatch.setitem(DISTURBANCES, "fog", importlib.import_module("seam_disturbance").Fog)
     monkeypatch.setitem(MODELS, "oldest", "seam_baseline:Oldest")
     monkeypatch.setitem(MODELS, "tiny", "seam_network:Tiny")
     monkeypatch.setitem(METRICS, "coverage", importlib.import_module("seam_metric").Coverage())
@@ -205,7 +228,7 @@ def test_what_is_added_in_one_file_each_stands_in_a_finished_report(added):
     assert {log["dataset"] for log in record["logs"]} == {"toy"}
     rows = {row["name"]: row for row in record["rows"]}
     assert {name: row["failure"] for name, row in rows.items()} == dict.fromkeys(
-        ("newest", "oldest", "kerb", "tiny-w2", "tiny-w4")
+        ("newest", "oldest", "kerb", "fog", "tiny-w2", "tiny-w4")
     )
     assert rows["kerb"]["facts"]["sensors"] == ["full", "kerb"]
     assert (rows["oldest"]["facts"]["baseline"], rows["tiny-w2"]["facts"]["learns"]) == (True, True)
@@ -214,6 +237,7 @@ def test_what_is_added_in_one_file_each_stands_in_a_finished_report(added):
     everywhere = summary[(summary.division == "all") & (summary.region == "all")].set_index(["row", "metric", "column"])
     known = {name: everywhere.loc[(name, "coverage", "known")].value for name in rows}
     assert known["kerb"] > known["newest"] > 0.0  # the kerb fills cells that no camera saw
+    assert known["newest"] > known["fog"] > 0.0
     mean = {name: everywhere.loc[(name, "iou", "mean_known")].value for name in rows}
     assert mean["newest"] != mean["oldest"]
     assert everywhere.loc[("tiny-w2", "iou", "mean_known")].reference == "newest"
@@ -226,6 +250,7 @@ def test_what_is_added_in_one_file_each_stands_in_a_finished_report(added):
         "by the side of the road",
         "tiny-w4",
         "a tiny network",
+        "nothing seen in 96 rows",
     ):
         assert text in page
 

@@ -1,5 +1,6 @@
 """A row of a matrix: an experiment with everything that determines it; with one seed, it is a unit of a run."""
 
+import operator
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple, Self
 
@@ -14,6 +15,7 @@ from semgrid_eval.models.registry import MODELS, find_model, installed_models, i
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.results import RowFacts
 from semgrid_eval.windows.data import WindowConfig
+from semgrid_eval.windows.disturb.kinds import AnyDisturbance
 
 
 def _found(model: str) -> type[Model] | None:
@@ -46,6 +48,9 @@ class Row(Config):
     # Where it differs from `window`, for recordings of another frame rate; what a file leaves out is as in `window`,
     # and the number of inputs has to be.
     validation_window: WindowConfig | None = None
+    # What is wrong with the inputs that are scored; training, targets and mask M are those of the undisturbed row. It
+    # is not written where it is not set, so that ids stay.
+    disturb: AnyDisturbance | None = Field(None, exclude_if=operator.not_)
 
     @field_validator("settings")
     @classmethod
@@ -72,6 +77,8 @@ class Row(Config):
         reach = self.window.span_frames + max(self.leads_frames, default=0)
         if self.window.target_frame is not None and reach > self.window.target_frame:
             raise ValueError(f"train_leads reach back {reach} frames, and target_frame is {self.window.target_frame}")
+        if self.disturb:
+            self.disturb.check(self.window.inputs)
         if found := self.found_model():
             found.check(found.parse_settings(self.settings), self.given)
         return self
@@ -114,6 +121,7 @@ class Row(Config):
             horizon_steps=self.scored_window.horizon_steps,
             sensors=self.sensors,
             translate=self.translate,
+            disturbed=self.disturb.words if self.disturb else "",
         )
 
     @property
@@ -127,6 +135,8 @@ class Row(Config):
             f"{self.window.inputs} inputs",
             f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead",
         ]
+        if self.disturb:
+            parts.append(self.disturb.words)
         return f"{self.name} ({', '.join(parts)})"
 
 

@@ -77,7 +77,8 @@ class Worker:
     def scored_windows(self, row: Row) -> tuple[WindowSet, dict[str, str]]:
         """Select the windows on which a row is scored, and say why some logs give none."""
         data = self.scored_data
-        scored, too_short = self._select(data, row, row.validation_split, row.scored_window, validation_windows)
+        undisturbed, too_short = self._select(data, row, row.validation_split, row.scored_window, validation_windows)
+        scored = undisturbed.disturbed(row.disturb, row.grid.spec)
         return scored, {data.log_of[scored.data.recordings[index]]: why for index, why in too_short.items()}
 
     def run(self, row: Row, seed: int | None) -> Job:
@@ -129,10 +130,10 @@ class Worker:
     def _watched(self, row: Row, scored: WindowSet) -> WindowSet | None:
         """Select the windows whose loss a training notes; they are the training logs' own, wherever it is scored.
 
-        So one training serves the scores on all sorts of logs.
+        So one training serves the scores on all sorts of logs, and of disturbed inputs.
         """
         if self.scored_data is self.training_data and not row.train_leads:
-            return scored
+            return scored.disturbed(None, row.grid.spec)
         data, split = self.training_data, row.validation_split
         try:
             return self._select(data, row, split, row.window, validation_windows, row.leads_frames)[0]

@@ -64,7 +64,9 @@ def evaluate(
         seen = windows.batch(chosen)
         answer = _predict(model, seen)
         prediction, left_out = apply_mask(answer.prediction, seen.mask.cpu().numpy(), mask_mode)
-        aligned = seen if windows.translate else replace(windows, translate=True).batch(chosen)
+        # What was to be seen, whichever way a row sees it.
+        plain = windows.translate and not windows.disturb
+        aligned = seen if plain else replace(windows, translate=True, disturb=None).batch(chosen)
         target, inputs, actors = seen.target.cpu().numpy(), aligned.past.cpu().numpy(), windows.actors(chosen)
         scored = ScoredWindows(
             target=target,

@@ -81,6 +81,7 @@ class RowFacts(Config):
     horizon_steps: int  # steps from the newest input to the target
     sensors: tuple[str, ...]  # names of the inputs' sensors
     translate: bool  # whether inputs are moved into the target's place
+    disturbed: str = ""  # what is wrong with its inputs, in words; empty where nothing is
 
 
 class ResultRecord(Config):

@@ -1,6 +1,7 @@
 """Cameras with disparity and labels: a rectangle of the image is a sensor."""
 
 import heapq
+import operator
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Literal, Self
 
@@ -29,6 +30,11 @@ class CameraSensor(SensorConfig):
     bottom_px: int | None = None  # None reaches to the edge
     left_px: int = Field(0, ge=0)
     right_px: int | None = None  # None reaches to the edge
+    # Pixels that give no point (`sensors.exclusion`): those with another class at most so many pixels away, and those
+    # with a neighbour whose disparity differs by more; both in pixels of the resized image. What is not set is not
+    # written either, so that grids of all pixels keep their digests.
+    exclude_border_px: int = Field(0, ge=0, le=64, exclude_if=operator.not_)
+    exclude_depth_step_px: float | None = Field(None, gt=0.0, le=100.0, exclude_if=operator.not_)
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
@@ -89,17 +95,25 @@ def _read_camera(
 ) -> Iterator[Points]:
     # Whoever reads settings alone does not wait for a compiler.
     from semgrid_eval.recording.png import decode_gray
+    from semgrid_eval.sensors.exclusion import Exclusion
     from semgrid_eval.sensors.projection import Projection
 
-    sizes_px = dict.fromkeys(sensor.image_size_px for sensor in sensors.values())
-    projections = {size_px: Projection(log.calibration(camera), size_px, class_by_label) for size_px in sizes_px}
+    calibration = log.calibration(camera)
+    views = {
+        name: (sensor.image_size_px, Exclusion(sensor.exclude_border_px, sensor.exclude_depth_step_px))
+        for name, sensor in sensors.items()
+    }
+    projections = {
+        (size_px, exclusion): Projection(calibration, size_px, class_by_label, exclusion)
+        for size_px, exclusion in views.values()
+    }
     for frame in log.frames(camera):
         if not frame.label_png:
             place = f"frame at {frame.stamp_ns} ns"
             raise LogError("has no label image; add labels to the log (convert cityscapes --labels DIR)", field=place)
         disparity, label = decode_gray(frame.disparity_png, bit_depth=16), decode_gray(frame.label_png, bit_depth=8)
-        seen = {size_px: projection.points(disparity, label) for size_px, projection in projections.items()}
+        seen = {view: projection.points(disparity, label) for view, projection in projections.items()}
         for name, sensor in sensors.items():
             top, bottom, left, right = sensor.crop_px
-            pixels, part = seen[sensor.image_size_px], np.s_[top:bottom, left:right]
+            pixels, part = seen[views[name]], np.s_[top:bottom, left:right]
             yield Points(name, frame.stamp_ns, pixels.forward_m[part], pixels.left_m[part], pixels.class_id[part])

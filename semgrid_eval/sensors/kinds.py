@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, SerializeAsAny, StringConstraints
 
-from semgrid_eval.config import strictly
+from semgrid_eval.config import of_kind
 from semgrid_eval.sensors.camera import CameraSensor, read_cameras
 from semgrid_eval.sensors.sensor import Kind, Points, SensorConfig
 
@@ -22,15 +22,7 @@ TOLERANCE_NS = 1_000_000
 
 
 def _of_its_kind(value: object) -> object:
-    if not isinstance(value, Mapping):
-        return value
-    kind = value.get("kind", _DEFAULT_KIND)
-    if kind not in tuple(KINDS):
-        raise ValueError(f"kind {kind!r} is not one of {', '.join(KINDS)}")
-    config = KINDS[kind].config
-    if unknown := [key for key in value if key not in config.model_fields]:
-        raise ValueError(f"unknown key {unknown[0]!r}; allowed here: {', '.join(sorted(config.model_fields))}")
-    return strictly(config, value)
+    return of_kind(value, {name: kind.config for name, kind in KINDS.items()}, _DEFAULT_KIND)
 
 
 SensorName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}$")]

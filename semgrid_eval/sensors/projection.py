@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import NO_POINT
 from semgrid_eval.recording.types import CameraCalibration
+from semgrid_eval.sensors.exclusion import ALL_PIXELS, Exclusion
 
 Floats = NDArray[np.float64]
 Ids = NDArray[np.uint8]
@@ -30,10 +31,18 @@ class Projection:
         calibration: in pixels of the source image.
         size_px: width and height to which images are brought.
         class_by_label: (256,) grid class of each label id, `NO_POINT` for none.
+        exclusion: which pixels of the images at that size give no point.
     """
 
-    def __init__(self, calibration: CameraCalibration, size_px: tuple[int, int], class_by_label: Ids) -> None:
+    def __init__(
+        self,
+        calibration: CameraCalibration,
+        size_px: tuple[int, int],
+        class_by_label: Ids,
+        exclusion: Exclusion = ALL_PIXELS,
+    ) -> None:
         self._calibration, self._size_px, self._class_by_label = calibration, size_px, class_by_label
+        self._exclusion = exclusion
         self._slopes: dict[tuple[int, ...], Floats] = {}
         self._origin_m = np.array([calibration.x_m, calibration.y_m])
         self._depth_disparity_m_px = calibration.fx_px * calibration.baseline_m  # at the disparity's own resolution
@@ -58,7 +67,15 @@ class Projection:
             (self._slopes[shape], self._origin_m, self._depth_disparity_m_px),
             (forward_m, left_m, class_id),
         )
+        if self._exclusion:
+            classes = self._class_by_label[self._resized(label)]
+            source_px = shape[1] / self._size_px[0]
+            class_id[self._exclusion.mask(classes, self._resized(disparity), source_px)] = NO_POINT
         return Pixels(forward_m, left_m, class_id)
+
+    def _resized(self, image: Image) -> Image:
+        rows, columns = self._sides(image.shape)
+        return image.take(rows, axis=0).take(columns, axis=1)
 
     def _sides(self, shape: tuple[int, ...]) -> _Sides:
         width, height = self._size_px

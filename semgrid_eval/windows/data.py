@@ -14,6 +14,8 @@ from torch import Tensor
 from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import DIGEST_CHARACTERS
+from semgrid_eval.grids.spec import GridSpec
+from semgrid_eval.windows.disturb.disturbance import Disturbance, Inputs
 from semgrid_eval.windows.grids import GridData, covered_without_truth, shift_grids, shift_in_cells
 
 
@@ -140,6 +142,29 @@ class WindowBatch:
 
 
 @dataclass(frozen=True)
+class Disturb:
+    """How the inputs of windows are disturbed, and the extent of their grids."""
+
+    how: Disturbance
+    spec: GridSpec
+
+    def __call__(self, windows: "WindowSet", chosen: Tensor | slice, grids: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Disturb the grids (B, S, T, H, W) of chosen windows: -> grids, shift (B, T, 2) and lead (B, T)."""
+        inputs = Inputs(
+            data=windows.data,
+            spec=self.spec,
+            sensor_rows=windows.sensor_rows,
+            frames=windows.inputs[chosen].cpu().numpy(),
+            target_frames=windows.target_frames[chosen].cpu().numpy(),
+            grids=grids,
+            shift_cells=windows.shift_cells[chosen],
+            lead_s=windows.lead_s[chosen],
+        )
+        found = self.how.apply(inputs)
+        return found.grids, found.shift_cells, found.lead_s
+
+
+@dataclass(frozen=True)
 class WindowSet:
     """N windows over grid data; frames are indices along F."""
 
@@ -151,6 +176,7 @@ class WindowSet:
     target_frames: Tensor  # (N,) int64
     shift_cells: Tensor  # (N, T, 2) int64
     lead_s: Tensor  # (N, T) float32
+    disturb: Disturb | None = None  # what is wrong with the inputs that a model sees; M and targets never change
 
     def __len__(self) -> int:
         return len(self.target_frames)
@@ -162,18 +188,26 @@ class WindowSet:
 
     def batch(self, chosen: Tensor | slice) -> WindowBatch:
         """Gather the chosen windows: (B,) int64 or a slice."""
-        shift_cells = self.shift_cells[chosen]
+        shift_cells, lead_s = self.shift_cells[chosen], self.lead_s[chosen]
         seen = self.data.grids[self.sensor_rows[None, :, None], self.inputs[chosen][:, None, :]]
         aligned = shift_grids(seen, shift_cells[:, None])
         target = self.data.grids[self.data.sensor_index(self.data.target), self.target_frames[chosen]]
+        mask = covered_without_truth(aligned, target)
+        if self.disturb:
+            seen, shift_cells, lead_s = self.disturb(self, chosen, seen)
+            aligned = shift_grids(seen, shift_cells[:, None])
         return WindowBatch(
             past=aligned if self.translate else seen,
             sensors=self.sensors,
             shift_cells=shift_cells,
-            lead_s=self.lead_s[chosen],
+            lead_s=lead_s,
             target=target,
-            mask=covered_without_truth(aligned, target),
+            mask=mask,
         )
+
+    def disturbed(self, how: Disturbance | None, spec: GridSpec) -> "WindowSet":
+        """Return the same windows with inputs that are wrong in some way, or right where none is given."""
+        return replace(self, disturb=None if how is None else Disturb(how, spec))
 
     def actors(self, chosen: slice) -> NDArray[np.uint8] | None:
         """Flag the cells near true actors, as `GridData.actors_near` does: -> (B, H, W)."""
@@ -187,6 +221,8 @@ class WindowSet:
     def digest(self) -> str:
         """Digest what determines every batch, given how logs become grids: logs, sensors, translation and frames."""
         total = hashlib.sha256(repr((self.data.digests, self.data.cell_m, self.sensors, self.translate)).encode())
+        if self.disturb:
+            total.update(self.disturb.how.model_dump_json().encode())
         for part in (self.inputs, self.target_frames):
             total.update(repr(tuple(part.shape)).encode() + part.cpu().numpy().tobytes())
         return total.hexdigest()[:DIGEST_CHARACTERS]

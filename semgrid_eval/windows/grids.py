@@ -33,6 +33,7 @@ class GridData:
     first_frames: NDArray[np.int64]  # (R + 1,) where each recording begins along F, and F
     stamps_ns: NDArray[np.int64]  # (F,) int64
     position_m: NDArray[np.float64]  # (F, 2) forward and left in the grid orientation of the frame's own recording
+    yaw_rad: NDArray[np.float64]  # (F,) heading in that orientation
     cell_m: float  # edge of a cell
     # For each recording (its F, H, W) flags of true actors, None where its log does not hold the truth. They stay on
     # the host: scores are split by them, and nothing is predicted from them.
@@ -117,6 +118,7 @@ def stack_recordings(
         first_frames=first_frames,
         stamps_ns=np.concatenate([entry.stamps_ns for entry in recordings]),
         position_m=np.concatenate([entry.position_m for entry in recordings]),
+        yaw_rad=np.concatenate([entry.yaw_rad for entry in recordings]),
         cell_m=cell_m,
         actors=tuple(entry.actors for entry in recordings),
     )

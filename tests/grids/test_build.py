@@ -67,6 +67,28 @@ def test_a_pole_seen_through_a_log_lands_where_it_stands(tmp_path, left_m, pitch
     assert {63 - int(np.floor(left_m / CELL_M))} <= set(columns)
 
 
+def test_finer_cells_hold_the_same_points(tmp_path):
+    world = street(1, frames=2, speed_mps=9.0)
+    for factor in (2, 4):
+        cells = 128 * factor
+        spec = GridSpec(rows=cells, columns=cells, cell_m=CELL_M / factor, agent_row=cells, agent_column=cells // 2)
+        fine = built(world, tmp_path, GridConfig(spec=spec, morphology="off"))
+        plain = built(world, tmp_path, GridConfig(morphology="off"))
+        known = fine.grids != UNKNOWN
+        blocks = known.reshape(*known.shape[:2], 128, factor, 128, factor).any(axis=(3, 5))
+        np.testing.assert_array_equal(blocks, plain.grids != UNKNOWN)
+        np.testing.assert_array_equal(fine.position_m, plain.position_m)
+        assert known.sum() < factor**2 * blocks.sum(), "the same points know less of an area in finer cells"
+
+
+def test_pixels_near_borders_are_in_no_grid(tmp_path):
+    config = GridConfig(sensors={"full": CameraSensor(exclude_border_px=2)}, morphology="off")
+    plain, less = (built(street(1, frames=2), tmp_path, each) for each in (GridConfig(morphology="off"), config))
+    known, kept = plain.grids[0] != UNKNOWN, less.grids[0] != UNKNOWN
+    assert (kept <= known).all()
+    assert 0.5 * known.sum() < kept.sum() < known.sum()
+
+
 def test_sensors_see_their_part_only_and_together_no_more_than_the_whole(tmp_path):
     recording = built(street(1, frames=2), tmp_path, GridConfig(morphology="off"))
     known = {name: recording.grids[i] != UNKNOWN for i, name in enumerate(recording.sensors)}

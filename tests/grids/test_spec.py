@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.runs.data import grid_digest
 from semgrid_eval.sensors.camera import CameraSensor
 
 
@@ -45,15 +46,25 @@ def test_targets_are_the_same_whatever_else_there_is_and_whatever_sensors_are_ca
         GridConfig(class_map={"terrain": None}),
         GridConfig(spec=GridSpec(rows=64, agent_row=64)),
         GridConfig(sensors={"full": CameraSensor(image_size_px=(1024, 512))}),
+        GridConfig(sensors={"full": CameraSensor(exclude_border_px=1)}),
+        GridConfig(sensors={"full": CameraSensor(exclude_depth_step_px=0.5)}),
         GridConfig(target=("split1_upper",)),
         GridConfig(target=("split1_upper", "split1_lower")),
     ]
     assert len({json.dumps(config.target_identity()) for config in (plain, *others)}) == 1 + len(others)
 
 
-def test_settings_come_back_from_json():
-    config = GridConfig(sensors={"a": CameraSensor(camera="rear", top_px=7)}, target=("a",))
+@pytest.mark.parametrize("sensor", [CameraSensor(camera="rear", top_px=7), CameraSensor(exclude_border_px=3)])
+def test_settings_come_back_from_json(sensor):
+    config = GridConfig(sensors={"a": sensor}, target=("a",))
     assert parse_config(GridConfig, config.model_dump(mode="json")) == config
+
+
+def test_grids_of_all_pixels_are_what_they_were_before_any_could_be_left_out():
+    assert grid_digest(GridConfig()) == "961a43ac9b56180b"
+    assert grid_digest(GridConfig(sensors={"full": CameraSensor(exclude_border_px=1)})) != grid_digest(
+        GridConfig(sensors={"full": CameraSensor()})
+    )
 
 
 def test_centres_are_half_a_cell_from_the_vehicle_and_a_cell_apart():
@@ -96,6 +107,9 @@ def test_a_point_at_a_cells_centre_is_drawn_in_that_cell(spec):
         ({"sensors": {"full": {"kind": "sonar"}}}, "sensors.full: kind 'sonar' is not one of camera"),
         ({"sensors": {"full": {"kind": ["camera"]}}}, "sensors.full: kind .* is not one of camera"),
         ({"sensors": {"full": {"bottom_px": "3"}}}, "sensors.full.bottom_px: .*found '3'"),
+        ({"sensors": {"full": {"exclude_border_px": -1}}}, "sensors.full.exclude_border_px: .*found -1"),
+        ({"sensors": {"full": {"exclude_border_px": 1.5}}}, "sensors.full.exclude_border_px: .*found 1.5"),
+        ({"sensors": {"full": {"exclude_depth_step_px": 0}}}, "sensors.full.exclude_depth_step_px: .*found 0"),
         ({"sensors": {"full": 3}}, "sensors.full"),
         ({"sensors": {"a b": {}}}, "sensors.a b"),
         ({"sensors": {"front": {}}}, "target: 'full' is not one of the sensors front"),

@@ -38,6 +38,7 @@ class FakeRow:
     baseline: bool | None = None  # `BL` are, if not said otherwise
     learns: bool | None = None  # what is not a baseline does, if not said otherwise
     cell_m: float = 0.78125  # of a grid with other cells, other targets
+    disturbed: str = ""  # what is wrong with its inputs; on record
 
     @property
     def name(self) -> str:
@@ -50,6 +51,7 @@ class FakeRow:
         model = {"BL-Fuse": "fuse", "BL-DC": "newest", "BL-NT": "newest"}.get(self.name, self.family.lower())
         learns = not baseline if self.learns is None else self.learns
         changes = {"baseline": baseline, "learns": learns, "model": model, "inputs": self.inputs}
+        changes["disturbed"] = self.disturbed
         return found.model_copy(update=changes)
 
     @property
@@ -57,6 +59,7 @@ class FakeRow:
         config: dict[str, object] = {"model": self.facts.model, "sensors": list(self.sensors)}
         config |= {"translate": self.translate, "window": {"horizon_steps": self.horizon_steps, "inputs": self.inputs}}
         config |= {"grid": {"cell_m": self.cell_m}, "settings": {"depth": 3} if self.seeds else {}}
+        config |= {"disturb": {"kind": self.disturbed}} if self.disturbed else {}
         return config
 
 

@@ -90,15 +90,20 @@ class Row:
         return {window.drive: self.groups.get(window.log) or window.drive for window in windows}
 
     @property
+    def disturbed(self) -> str:
+        """What is wrong with its inputs, in words; empty where nothing is."""
+        return self.record.facts.disturbed
+
+    @property
     def targets(self) -> str:
         """The comparability key of its results; empty where there is none."""
         return self.results[0].record.targets if self.results else ""
 
     @property
     def question(self) -> tuple[object, ...]:
-        """What it is asked: targets, sensors, number of inputs, frames between them, horizon and translation."""
+        """What it is asked: targets, sensors, number of inputs, their step, horizon, translation and disturbance."""
         f = self.record.facts
-        return self.targets, f.sensors, f.inputs, f.step_frames, f.horizon_steps, f.translate
+        return self.targets, f.sensors, f.inputs, f.step_frames, f.horizon_steps, f.translate, f.disturbed
 
     @property
     def shown(self) -> Result:

@@ -28,7 +28,7 @@ def by_question(rows: Sequence[Row]) -> list[list[Row]]:
     """Group rows by what they are asked, in the order in which this first appears.
 
     Rows answer the same question if they have the same targets, sensors, number of inputs, frames between them and
-    horizon, and if inputs are moved to the target's time for all of them or for none.
+    horizon, and if inputs are moved to the target's time for all of them or for none, and are disturbed alike.
     """
     groups: dict[tuple[object, ...], list[Row]] = {}
     for row in rows:
@@ -39,20 +39,25 @@ def by_question(rows: Sequence[Row]) -> list[list[Row]]:
 def reference_of(row: Row, rows: Sequence[Row]) -> Row | None:
     """Choose the baseline that a row is measured against, None for a baseline and where there is none.
 
-    It is a baseline of the same run, with the same targets, that looks as many frames ahead. Of several, the one is
-    taken that shares more with the row, in this order: the sensors, whether inputs are moved to the target's time, the
-    number of inputs, the frames between them; then one that does not learn; then the first one in the matrix.
+    It is a baseline of the same run, with the same targets and disturbance, that looks as many frames ahead. Of these,
+    the one is taken that shares more with the row, in this order: the sensors, whether inputs are moved to the target's
+    time, the number of inputs, the frames between them; then one that does not learn; then the first in the matrix.
     """
     if row.is_baseline:
         return None
     baselines = (other for other in rows if other.is_baseline and other.run == row.run and comparable(row, other))
-    choices = [other for other in baselines if _frames_ahead(other) == _frames_ahead(row)]
+    alike = (other for other in baselines if other.disturbed == row.disturbed)
+    choices = [other for other in alike if _frames_ahead(other) == _frames_ahead(row)]
     return max(choices, key=lambda other: _nearness(row, other), default=None)
 
 
 def main_group(rows: Sequence[Row]) -> list[Row]:
-    """Return the rows of the question that most rows answer; of equally many, the one that comes first."""
-    return max(by_question(rows), key=len, default=[])
+    """Return the rows of the question that most rows answer, of undisturbed inputs where there are some.
+
+    Of questions that equally many answer, it is the one that comes first.
+    """
+    undisturbed = [row for row in rows if not row.disturbed]
+    return max(by_question(undisturbed or rows), key=len, default=[])
 
 
 def headline(scores: Scores) -> Headline | None:
@@ -91,8 +96,14 @@ def _nearness(row: Row, other: Row) -> tuple[bool, ...]:
 
 
 def settings_of(row: Row) -> Mapping[str, object]:
-    """Return all that determined a row's numbers, nested settings under dotted names."""
-    return row.results[0].settings
+    """Return all that determined a row's numbers, nested settings under dotted names.
+
+    Sensors that neither its inputs nor its target use are left out: a grid may list more than a row needs.
+    """
+    found = row.results[0].settings
+    used = {*row.record.facts.sensors, *found.get("grid.target", ())}
+    unused = {key for key in found if key.startswith("grid.sensors.") and key.split(".")[2] not in used}
+    return {key: value for key, value in found.items() if key not in unused}
 
 
 def changed_settings(before: Mapping[str, object], after: Mapping[str, object]) -> dict[str, str]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.classes import CLASS_NAMES, KNOWN_IDS
 from semgrid_eval.report.estimates.bootstrap import LABELS, Everything, Parts, RowScores, Scores, everywhere
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.rows.load import Row, comparable
@@ -16,6 +16,7 @@ from semgrid_eval.report.rows.pairing import (
     settings_of,
     shared_windows,
 )
+from semgrid_eval.report.tables.disturbances import disturbance_table
 from semgrid_eval.report.tables.numbers import ABSENT, MINUS, interval_phrase, number, plural
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, plain_table
 from semgrid_eval.report.tables.values import difference_table, run_differences, side_by_side, value_table
@@ -44,6 +45,7 @@ def score_tables(scores: Scores, tags: Sequence[str]) -> dict[str, Table | None]
         "class_differences": difference_table("class-differences", _to_baseline("class"), scores, CLASS_NAMES),
         "classes": value_table("classes", _CLASSES, scores, CLASS_NAMES, beside_paper=True),
         "changes": changes_table(scores),
+        "disturbances": disturbance_table(scores),
         "not_compared": not_compared_table(scores),
         "merged": value_table("merged", _MERGED, scores, MERGED_COLUMNS),
         "runs": run_differences("runs", in_runs, scores, DIFFERENCE_COLUMNS),
@@ -166,7 +168,8 @@ def not_compared_table(scores: Scores) -> Table | None:
         "rows with the same targets: the same frames of the same logs, grid, mask mode and split."
     )
     lines = [_other_targets(group, with_main) for group in groups.values()]
-    return plain_table("not-compared", caption, "Rows with the same targets", ("What differs", "Windows"), lines)
+    columns = ("What differs", "Windows", "Known of a target")
+    return plain_table("not-compared", caption, "Rows with the same targets", columns, lines)
 
 
 def _other_targets(group: Sequence[Row], with_main: Sequence[Row]) -> Line:
@@ -178,8 +181,27 @@ def _other_targets(group: Sequence[Row], with_main: Sequence[Row]) -> Line:
     cells = (
         Cell(f"{'; '.join(reasons)} (against {base.name})"),
         Cell(f"{row.windows:,}", row.windows, f"{shared:,} shared"),
+        _known_cell(row, base),
     )
     return Line(", ".join(each.name for each in group), cells)
+
+
+def _known_cell(row: Row, base: Row) -> Cell:
+    """Show how much of a target is known on average, and how much more or less that is than another row has."""
+    area_m2, of_base_m2 = known_m2(row), known_m2(base)
+    if not np.isfinite(area_m2):
+        return Cell(ABSENT)
+    note = f"{area_m2 / of_base_m2:.1%} of {base.name}'s" if of_base_m2 > 0 else ""
+    return Cell(f"{area_m2:,.0f} m\N{SUPERSCRIPT TWO}", area_m2, note)
+
+
+def known_m2(row: Row) -> float:
+    """Return the mean area that is known in a target in square metres, NaN where the size of cells is not told."""
+    grid = row.results[0].grid
+    if grid is None:
+        return np.nan
+    cells = row.results[0].counts[:, list(KNOWN_IDS)].sum(axis=(1, 2)).mean()
+    return float(cells * grid.spec.cell_m**2)
 
 
 def _closest(entry: RowScores, above: Sequence[RowScores]) -> RowScores | None:

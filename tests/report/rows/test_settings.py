@@ -1,5 +1,7 @@
+from dataclasses import replace
+
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.rows.pairing import changed_settings, changed_targets, settings_but
+from semgrid_eval.report.rows.pairing import changed_settings, changed_targets, settings_but, settings_of
 
 
 def test_settings_are_compared_key_by_key():
@@ -25,3 +27,13 @@ def test_rows_are_alike_but_for_a_setting(run):
     assert settings_but(rows["BL-DC"]) != settings_but(rows["BL-NT"])
     assert settings_but(rows["BL-DC"], "translate") == settings_but(rows["BL-NT"], "translate")
     assert settings_but(rows["BL-DC"], "translate") != settings_but(rows["BL-Fuse"], "translate")
+
+
+def test_sensors_that_a_row_does_not_use_are_no_setting_of_it(run):
+    row = load_runs([run])[0].rows[0]
+    assert row.record.facts.sensors == ("front",)
+    sensors = {name: {"top_px": 7} for name in ("front", "rear", "side")}
+    config = {"grid": {"sensors": sensors, "target": ["rear"], "morphology": "off"}}
+    record = row.results[0].record.model_copy(update={"config": config})
+    found = settings_of(replace(row, results=(replace(row.results[0], record=record),)))
+    assert set(found) == {"grid.sensors.front.top_px", "grid.sensors.rear.top_px", "grid.target", "grid.morphology"}

@@ -5,6 +5,7 @@ import pytest
 from support.fake_run import FakeRow, make_fake_run
 from support.scoring import score_rows
 
+from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables.scores import changes_table, not_compared_table
 
@@ -56,6 +57,20 @@ def test_the_page_says_which_rows_are_not_compared_and_why(finer):
     assert line.header == "BL-fine, ED-fine"
     assert line.cells[0].text == "grid.cell_m 0.8 to 0.4 (against BL-DC)"
     assert (line.cells[1].text, line.cells[1].note) == ("4", "4 shared")
+    assert line.cells[2].text == "\N{EN DASH}", "the size of its cells is not told"
+
+
+def test_the_known_area_of_other_targets_is_set_against_the_main_ones(tmp_path):
+    rows = (FakeRow("DC", "BL"), FakeRow("Fuse", "BL"), FakeRow("fine", "BL", cell_m=0.4))
+    folder = make_fake_run(tmp_path / "run", rows=rows, recordings=2)
+    rows = [
+        _with_config(row, row.name, grid=GridConfig(spec=GridSpec(cell_m=cell_m)).model_dump(mode="json"))
+        for row, cell_m in zip(load_runs([folder])[0].rows, (0.8, 0.8, 0.4), strict=True)
+    ]
+    ((line,),) = not_compared_table(score_rows(rows, np.random.default_rng(0), draws=2)).bodies
+    known = [int(row.results[0].counts[:, 1:].sum()) for row in rows]
+    assert (line.header, line.cells[2].text) == ("BL-fine", f"{known[2] / 4 * 0.16:,.0f} m\N{SUPERSCRIPT TWO}")
+    assert line.cells[2].note == f"{known[2] / known[0] / 4:.1%} of BL-DC's"
 
 
 def test_logs_that_differ_are_a_reason_not_to_compare(tmp_path):

@@ -1,0 +1,42 @@
+"""Reversed order: the newest input comes where a model expects the oldest."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import torch
+from pydantic import Field
+
+from semgrid_eval.windows.disturb.disturbance import Disturbance, Inputs
+
+
+class ReversedOrder(Disturbance):
+    """Inputs come newest first in a share `strength` of the windows, drawn one by one.
+
+    Each grid keeps its time and its way to the target: it is moved into the right place, but taken for another one.
+    """
+
+    kind: Literal["reversed_order"] = "reversed_order"
+    strength: float = Field(1.0, gt=0, le=1)
+
+    @property
+    def words(self) -> str:
+        """Say what is wrong."""
+        share = "" if self.strength == 1 else f" in {100 * self.strength:g}% of the windows"
+        return f"inputs in reversed order{share}"
+
+    def check(self, inputs: int) -> None:
+        """Refuse what has no order."""
+        if inputs < 2:
+            raise ValueError("disturb.kind: one input has no order that could be reversed")
+
+    def apply(self, inputs: Inputs) -> Inputs:
+        """Reverse all that belongs to the inputs of the chosen windows."""
+        drawn = [generator.random() < self.strength for generator in inputs.generators(self.seed)]
+        chosen = torch.from_numpy(np.array(drawn)).to(inputs.grids.device)
+        return replace(
+            inputs,
+            grids=torch.where(chosen[:, None, None, None, None], inputs.grids.flip(2), inputs.grids),
+            shift_cells=torch.where(chosen[:, None, None], inputs.shift_cells.flip(1), inputs.shift_cells),
+            lead_s=torch.where(chosen[:, None], inputs.lead_s.flip(1), inputs.lead_s),
+        )
