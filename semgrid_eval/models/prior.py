@@ -31,7 +31,7 @@ class CellPrior(nn.Module):
         counts = torch.full(self.table.shape, SMOOTHING_CELLS, dtype=torch.float64)
         wanted = min(COUNTED_WINDOWS, len(windows))
         chosen = torch.linspace(0, len(windows) - 1, wanted).round().long().to(windows.inputs.device)
-        for part in chosen.split(_BATCH):
+        for part in torch.split(chosen, _BATCH):
             batch = windows.batch(part)
             cells = self._rows(batch) * CLASS_COUNT + batch.target
             counts += torch.bincount(cells[~batch.mask], minlength=counts.numel()).cpu().view_as(counts)

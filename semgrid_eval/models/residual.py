@@ -1,11 +1,14 @@
 """RN: a residual network that corrects, cell by cell, what a table says of the overlaid inputs (not in the paper)."""
 
+from itertools import pairwise
+
 import torch
 from pydantic import Field
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.models.augment import AugmentConfig
 from semgrid_eval.models.flow import MOVABLE
 from semgrid_eval.models.model import Given
 from semgrid_eval.models.network import (
@@ -36,8 +39,9 @@ class ResidualSettings(NetworkSettings):
         optimizer=OptimizerConfig(kind="adam"),
         schedule=ScheduleConfig(learning_rate=2e-3, shape="cosine"),
         loss=LossConfig(jaccard=1.0),
+        augment=AugmentConfig(flip=0.5),
     )
-    widths: tuple[int, ...] = Field((64, 96, 128, 128), min_length=1, max_length=6)  # channels, each at half the size
+    widths: tuple[int, ...] = Field((32, 64, 96, 128), min_length=1, max_length=6)  # channels, each at half the size
     fine: int = Field(24, ge=0, le=256)  # channels at full resolution; 0 leaves that branch out
     prior: bool = True  # whether it adds to the table of `models.prior`
     shift: int = Field(0, ge=0, le=8)  # reach of the shift mixture, in places of the trunk; 0 leaves it out
@@ -58,12 +62,8 @@ class Residual(Network):
         self.stem = _Convolution(given.planes * FOLD**2, widths[0])
         self.told = nn.Linear(given.inputs, widths[0]) if settings.lead_input else None
         self.down = nn.ModuleList(_Pair(width) for width in widths)
-        self.narrow = nn.ModuleList(
-            _Convolution(before, after, stride=2) for before, after in zip(widths, widths[1:], strict=False)
-        )
-        self.widen = nn.ModuleList(
-            nn.Conv2d(after, before, 1) for before, after in zip(widths, widths[1:], strict=False)
-        )
+        self.narrow = nn.ModuleList(_Convolution(before, after, stride=2) for before, after in pairwise(widths))
+        self.widen = nn.ModuleList(nn.Conv2d(after, before, 1) for before, after in pairwise(widths))
         self.up = nn.ModuleList(_Pair(width) for width in widths[:-1])
         fine = settings.fine or CLASS_COUNT
         self.unfold = nn.Conv2d(widths[0], fine * FOLD**2, 1)
@@ -74,6 +74,12 @@ class Residual(Network):
             nn.init.zeros_(self.classify.weight)
             nn.init.zeros_(torch.as_tensor(self.classify.bias))
         self.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # torch's stubs lack this form
+
+    @classmethod
+    def in_words(cls, settings: ResidualSettings) -> str:
+        """Say what the model does."""
+        told = ", told the lead" * settings.lead_input
+        return f"residual network of {' / '.join(map(str, settings.widths))} channels" + told
 
     def prepare(self, windows: WindowSet) -> None:
         """Count the table."""
@@ -91,7 +97,7 @@ class Residual(Network):
         logits = self.classify(self.fine(fine, planes) if self.fine is not None else fine)
         if self.shift is not None:
             logits = logits + self.shift(features, planes, batch.past.shape[1])
-        logits = logits[..., :rows, :columns]
+        logits = torch.as_tensor(logits)[..., :rows, :columns]
         return logits.float() + self.prior(batch) if self.prior is not None else logits
 
     def _trunk(self, folded: Tensor, lead_s: Tensor) -> Tensor:
@@ -105,7 +111,7 @@ class Residual(Network):
         for level in reversed(range(len(self.up))):
             larger = F.interpolate(self.widen[level](features), scale_factor=2, mode="nearest")
             features = self.up[level](larger + skips.pop())
-        return features
+        return torch.as_tensor(features)
 
 
 class _Convolution(nn.Sequential):
@@ -139,7 +145,7 @@ class _Fine(nn.Module):
 
     def forward(self, coarse: Tensor, planes: Tensor) -> Tensor:
         features = F.relu(self.normalise(coarse + self.see(planes)))
-        return features + self.mix(features)
+        return torch.as_tensor(features + self.mix(features))
 
 
 class _ShiftMixture(nn.Module):
@@ -158,14 +164,21 @@ class _ShiftMixture(nn.Module):
         nn.init.constant_(torch.as_tensor(self.gate.bias), _SHUT)
 
     def forward(self, features: Tensor, planes: Tensor, sensors: int) -> Tensor:
-        """Return what is added to the logits: features (B, D, H / 2, W / 2), planes (B, S * T * C, H, W) -> (B, C, H, W)."""
-        newest = planes.unflatten(1, (sensors, -1, CLASS_COUNT))[:, :, -1, MOVABLE].amax(dim=1)  # (B, M, H, W)
-        folded = F.pixel_unshuffle(newest, FOLD)
+        """Return what is added to the logits: (B, C, H, W).
+
+        Args:
+            features: (B, D, H / 2, W / 2) of the trunk.
+            planes: (B, S * T * C, H, W) of all inputs.
+            sensors: S.
+        """
+        batch, _, rows, columns = planes.shape
+        newest = planes.view(batch, sensors, -1, CLASS_COUNT, rows, columns)[:, :, -1, MOVABLE].amax(dim=1)
+        folded = F.pixel_unshuffle(newest, FOLD)  # (B, 4 M, H / 2, W / 2), M classes that move
         seen = F.unfold(folded, 2 * self._reach + 1, padding=self._reach)
-        seen = seen.unflatten(1, (folded.shape[1], -1)).unflatten(-1, folded.shape[-2:])  # (B, 4 M, K, H / 2, W / 2)
+        seen = seen.view(batch, folded.shape[1], -1, *folded.shape[-2:])  # (B, 4 M, displacements, H / 2, W / 2)
         weights = self.choose(features).softmax(dim=1)
         moved = F.pixel_shuffle((seen * weights[:, None]).sum(dim=2), FOLD)
         gate = F.interpolate(self.gate(features).sigmoid(), scale_factor=FOLD, mode="nearest")
         change = gate * self.gain * (moved - newest)
-        added = change.new_zeros(change.shape[0], CLASS_COUNT, *change.shape[-2:])
+        added = change.new_zeros(batch, CLASS_COUNT, rows, columns)
         return added.index_copy(1, torch.tensor(MOVABLE, device=change.device), change)

@@ -101,7 +101,10 @@ class _Trainer:
                 loss = self._run_epoch(epoch, progress)
                 seconds = round(time.monotonic() - started_s, 3)
             validated = self._validation_loss(validation) if validation else None
-            updates, rate = self._config.updates_until(epoch + 1), self._config.rate_at(self._config.updates_until(epoch), epoch)
+            updates, rate = (
+                self._config.updates_until(epoch + 1),
+                self._config.rate_at(self._config.updates_until(epoch), epoch),
+            )
             history.append(EpochRecord(epoch + 1, updates, rate, loss, validated, seconds))
             store.keep(self._network, self._optimizer, history)
         store.finish(self._network, history)

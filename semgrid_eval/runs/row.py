@@ -72,16 +72,21 @@ class Row(Config):
             raise ValueError(f"model {self.model!r} is not one of {names} or path.py:Class")
         if self.scored_window.inputs != self.window.inputs:
             raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
-        if self.train_leads and not 1 <= self.train_leads[0] <= self.train_leads[1]:
-            raise ValueError(f"train_leads {list(self.train_leads)} are not frames from and to")
-        reach = self.window.span_frames + max(self.leads_frames, default=0)
-        if self.window.target_frame is not None and reach > self.window.target_frame:
-            raise ValueError(f"train_leads reach back {reach} frames, and target_frame is {self.window.target_frame}")
+        self._check_leads()
         if self.disturb:
             self.disturb.check(self.window.inputs)
         if found := self.found_model():
             found.check(found.parse_settings(self.settings), self.given)
         return self
+
+    def _check_leads(self) -> None:
+        if self.train_leads is None:
+            return
+        if not 1 <= self.train_leads[0] <= self.train_leads[1]:
+            raise ValueError(f"train_leads {list(self.train_leads)} are not frames from and to")
+        reach, target = self.window.span_frames + self.train_leads[1], self.window.target_frame
+        if target is not None and reach > target:
+            raise ValueError(f"train_leads reach back {reach} frames, and target_frame is {target}")
 
     @property
     def scored_window(self) -> WindowConfig:

@@ -74,9 +74,7 @@ class WindowPlan:
     too_short: dict[int, str]
 
 
-def training_windows(
-    frame_counts: Sequence[int], config: WindowConfig, leads_frames: Sequence[int] = ()
-) -> WindowPlan:
+def training_windows(frame_counts: Sequence[int], config: WindowConfig, leads_frames: Sequence[int] = ()) -> WindowPlan:
     """Return every window of every recording: offsets o with inputs o, o+s, ..., o+(n-1)s and target o+(n-1+h)s.
 
     With `leads_frames`, frames from the newest input to the target, there are those of each of these leads instead.

@@ -150,8 +150,12 @@ def _residual_over(pair: Pair) -> tuple[Claim, ...]:
     first, second = pair
     moving = tuple(Check((pair,), score, region="moving") for score in ("vehicles", "person"))
     return (
-        Claim(f"{first}-{second}", f"{first} is better than {second} in every category", _each((*_LARGE, *_SMALL), pair)),
-        Claim(f"{first}-moving-{second}", f"{first} is better than {second} on moving vehicles and persons alone", moving),
+        Claim(
+            f"{first}-{second}", f"{first} is better than {second} in every category", _each((*_LARGE, *_SMALL), pair)
+        ),
+        Claim(
+            f"{first}-moving-{second}", f"{first} is better than {second} on moving vehicles and persons alone", moving
+        ),
     )
 
 
