@@ -20,6 +20,15 @@ class Config(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
 
+def merged(base: Mapping[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:
+    """Put `change` over `base`, mapping by mapping."""
+    result = dict(base)
+    for key, value in change.items():
+        old = result.get(key)
+        result[key] = merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return result
+
+
 class _StrictLoader(yaml.SafeLoader):
     """The plain values of YAML 1.2's core schema (`off` is a word, `1e-4` a number), and nothing ambiguous.
 

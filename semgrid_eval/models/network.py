@@ -5,12 +5,12 @@ from collections.abc import Iterator
 from typing import Any, Literal, Self, TypeVar
 
 import torch
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 from torch import Tensor
 from torch.nn import functional as F
 
 from semgrid_eval.classes import CLASS_COUNT
-from semgrid_eval.config import Config
+from semgrid_eval.config import Config, merged, strictly
 from semgrid_eval.models.augment import AugmentConfig
 from semgrid_eval.models.device import Precision, choose_precision, seeded
 from semgrid_eval.models.model import Given, Model, one_hot
@@ -97,6 +97,13 @@ class NetworkSettings(Config):
     """Settings of any network; its own class adds what its layers need."""
 
     training: TrainingConfig = TrainingConfig()
+
+    @field_validator("training", mode="before")
+    @classmethod
+    def _over_its_own(cls, values: object) -> object:
+        """Put what is set of the training over the default of this network, not over the paper's."""
+        own = cls.model_fields["training"].default
+        return strictly(TrainingConfig, merged(own.model_dump(), values)) if isinstance(values, dict) else values
 
 
 class Network(Model, torch.nn.Module):

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import Field
 
-from semgrid_eval.config import Config, load_yaml, parse_config
+from semgrid_eval.config import Config, load_yaml, merged, parse_config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.models.registry import is_named
 from semgrid_eval.runs.row import Row
@@ -105,9 +105,9 @@ def _extended(base: _MatrixFile, file: _MatrixFile, path: Path) -> _MatrixFile:
         if place is None:
             rows.append(row)
         else:
-            rows[place] = _merge(rows[place], row)
+            rows[place] = merged(rows[place], row)
     seed = base.seed if file.seed is None else file.seed
-    models, defaults = _merge(base.models, file.models), _merge(base.defaults, file.defaults)
+    models, defaults = merged(base.models, file.models), merged(base.defaults, file.defaults)
     return _MatrixFile(title=file.title, seed=seed, models=models, defaults=defaults, rows=rows)
 
 
@@ -143,25 +143,25 @@ def _expanded(file: _MatrixFile, path: Path) -> Iterator[tuple[str, dict[str, An
     number = 0
     for row in file.rows:
         place = f"row {row.get('name', '?')!r}"
-        merged = _merge(file.defaults, row)
-        axes = parse_config(_Axes, merged.pop("axes", {}), path=f"{path}: {place}.axes")
+        whole = merged(file.defaults, row)
+        axes = parse_config(_Axes, whole.pop("axes", {}), path=f"{path}: {place}.axes")
         for values in _combinations(axes, f"{path}: {place}"):
             number += 1
             if number > ROW_LIMIT:
                 raise ConfigError(f"gives more than {ROW_LIMIT} rows", path=path, field="axes")
-            filled = _fill(merged, values, f"{path}: {place}")
+            filled = _fill(whole, values, f"{path}: {place}")
             yield place, _with_bases(filled, file.models)
 
 
 def _with_bases(row: dict[str, Any], models: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """Put under a row's settings those of its model, and under its validation window its window."""
     bases = {"settings": models.get(str(row.get("model"))), "validation_window": row.get("window")}
-    merged = {
-        key: _merge(base, row.get(key, {}))
+    over_bases = {
+        key: merged(base, row.get(key, {}))
         for key, base in bases.items()
         if isinstance(base, dict) and isinstance(row.get(key, {} if key == "settings" else None), dict)
     }
-    return row | merged
+    return row | over_bases
 
 
 def _combinations(axes: _Axes, place: str) -> Iterator[dict[str, Any]]:
@@ -179,19 +179,10 @@ def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, 
         nested: Any = value
         for part in reversed(key.split(".")):
             nested = {part: nested}
-        row = _merge(row, nested)
+        row = merged(row, nested)
     name = _written_name(row)
     for key, value in values.items():
         name = name.replace("{" + key + "}", str(value))
     if "{" in name:
         raise ConfigError(f"{name!r} has a place that no axis fills", path=place, field="name")
     return row | {"name": name}
-
-
-def _merge(base: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
-    """Put `change` over `base`, mapping by mapping."""
-    merged = dict(base)
-    for key, value in change.items():
-        old = merged.get(key)
-        merged[key] = _merge(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
-    return merged

@@ -93,3 +93,11 @@ def test_it_is_told_the_lead_only_on_request():
     for told in (False, True):
         net = network(Residual, **SMALL, prior=False, lead_input=told).eval()
         assert torch.equal(net(batch), net(later)) is not told
+
+
+def test_what_is_set_of_the_training_lies_over_the_networks_own():
+    own = Residual.parse_settings({}).training
+    changed = Residual.parse_settings({"training": {"batch": 4, "schedule": {"learning_rate": 1e-3}}}).training
+    assert changed == own.model_copy(
+        update={"batch": 4, "schedule": own.schedule.model_copy(update={"learning_rate": 1e-3})}
+    )
