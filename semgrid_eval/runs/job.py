@@ -67,7 +67,7 @@ def target_key(row: Row, scored: WindowSet) -> str:
     digests = [scored.data.digests[owner] for owner in owners]
     targets = sorted(zip(digests, scored.data.stamps_ns[frames].tolist(), places.tolist(), strict=True))
     grid = row.grid.target_identity()
-    return digest_value([targets, grid, row.mask_mode, row.validation_split, list(CLASS_NAMES)])
+    return digest_value([targets, grid, row.mask_mode, row.scored_split, list(CLASS_NAMES)])
 
 
 def window_records(windows: WindowSet, log_of: dict[str, str]) -> tuple[results.WindowRecord, ...]:

@@ -41,6 +41,9 @@ class Row(Config):
     repeats: int = Field(1, ge=1, le=1000)  # seeds of a model in which chance plays a part
     train_split: str = "train"
     validation_split: str = "val"
+    # Groups of recordings (towns, cities, drives) of the training split that are scored instead of the validation
+    # split, and not trained on: for choices, which are not to be made on what is scored in the end.
+    hold_out: tuple[str, ...] = ()
     window: WindowConfig = WindowConfig()
     # Leads to train on, from and to so many frames, where it is not the window's own alone: one training for all rows
     # that differ in the horizon.
@@ -92,6 +95,11 @@ class Row(Config):
     def scored_window(self) -> WindowConfig:
         """Windows that are scored."""
         return self.validation_window or self.window
+
+    @property
+    def scored_split(self) -> str:
+        """The split of which recordings are scored."""
+        return self.train_split if self.hold_out else self.validation_split
 
     @property
     def leads_frames(self) -> tuple[int, ...]:

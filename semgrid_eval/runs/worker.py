@@ -38,6 +38,32 @@ from semgrid_eval.windows.data import (
 WindowPlanner = Callable[[Sequence[int], WindowConfig, Sequence[int]], WindowPlan]
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """Which windows of a folder of logs."""
+
+    split: str
+    config: WindowConfig
+    plan: WindowPlanner
+    leads_frames: tuple[int, ...] = ()
+    groups: tuple[str, ...] = ()  # which are held out of the training, if any are
+    held_out: bool = False  # whether these are wanted, or the others
+
+    def recordings(self, groups: Sequence[str]) -> set[int]:
+        """Choose recordings by their groups.
+
+        Raises:
+            InputError: a group is not among them.
+        """
+        for group in self.groups:
+            if group not in groups:
+                found = ", ".join(sorted(set(groups))) or "none"
+                message = f"no recording of split {self.split!r} is of the group {group!r}, only {found}"
+                raise InputError(message, field="hold_out")
+        chosen = {index for index, group in enumerate(groups) if group in self.groups}
+        return chosen if self.groups and self.held_out else set(range(len(groups))) - chosen
+
+
 @dataclass(eq=False)
 class Worker:
     """Fits and scores single units; holds the grids that they share.
@@ -77,7 +103,8 @@ class Worker:
     def scored_windows(self, row: Row) -> tuple[WindowSet, dict[str, str]]:
         """Select the windows on which a row is scored, and say why some logs give none."""
         data = self.scored_data
-        undisturbed, too_short = self._select(data, row, row.validation_split, row.scored_window, validation_windows)
+        wanted = _Wanted(row.scored_split, row.scored_window, validation_windows, (), row.hold_out, held_out=True)
+        undisturbed, too_short = self._select(data, row, wanted)
         scored = undisturbed.disturbed(row.disturb, row.grid.spec)
         return scored, {data.log_of[scored.data.recordings[index]]: why for index, why in too_short.items()}
 
@@ -109,22 +136,17 @@ class Worker:
         is_network = issubclass(job.resolved.model, Network)
         return job.training.folder / TRAINING_HISTORY_FILE if job.training and is_network else None
 
-    def _select(
-        self,
-        data: GridSource,
-        row: Row,
-        split: str,
-        config: WindowConfig,
-        plan: WindowPlanner,
-        leads_frames: tuple[int, ...] = (),
-    ) -> tuple[WindowSet, dict[int, str]]:
+    def _select(self, data: GridSource, row: Row, wanted: "_Wanted") -> tuple[WindowSet, dict[int, str]]:
         """Select windows once for all seeds and rows that share them, with the reasons why recordings are too short."""
-        key = (data, grid_digest(row.grid), split, config, row.sensors, row.translate, plan, leads_frames)
+        key = (data, grid_digest(row.grid), row.sensors, row.translate, wanted)
         if key not in self._selected:
-            grids = data.data(row.grid, split)
-            planned = plan(grids.frame_counts, config, leads_frames)
-            windows = select_windows(grids, planned.windows, sensors=row.sensors, translate=row.translate)
-            self._selected[key] = windows, planned.too_short
+            grids = data.data(row.grid, wanted.split)
+            planned = wanted.plan(grids.frame_counts, wanted.config, wanted.leads_frames)
+            kept = wanted.recordings(grids.groups)
+            chosen = [window for window in planned.windows if window.recording in kept]
+            windows = select_windows(grids, chosen, sensors=row.sensors, translate=row.translate)
+            too_short = {index: why for index, why in planned.too_short.items() if index in kept}
+            self._selected[key] = windows, too_short
         return self._selected[key]
 
     def _watched(self, row: Row, scored: WindowSet) -> WindowSet | None:
@@ -134,15 +156,17 @@ class Worker:
         """
         if self.scored_data is self.training_data and not row.train_leads:
             return scored.disturbed(None, row.grid.spec)
-        data, split = self.training_data, row.validation_split
+        wanted = _Wanted(
+            row.scored_split, row.window, validation_windows, row.leads_frames, row.hold_out, held_out=True
+        )
         try:
-            return self._select(data, row, split, row.window, validation_windows, row.leads_frames)[0]
+            return self._select(self.training_data, row, wanted)[0]
         except InputError:  # no such logs among them, and none is needed
             return None
 
     def _training(self, resolved: Resolved, row: Row, seed: int | None, scored: WindowSet) -> Training:
-        data, split = self.training_data, row.train_split
-        windows = self._select(data, row, split, row.window, training_windows, row.leads_frames)[0]
+        wanted = _Wanted(row.train_split, row.window, training_windows, row.leads_frames, row.hold_out)
+        windows = self._select(self.training_data, row, wanted)[0]
         watched = self._watched(row, scored) if issubclass(resolved.model, Network) else None
         # All that decides what a model learns.
         settings, precision = resolved.settings, ""

@@ -30,6 +30,7 @@ class GridData:
     recordings: tuple[str, ...]  # names of the recordings
     logs: tuple[str, ...]  # paths of their logs
     digests: tuple[str, ...]  # of those logs
+    groups: tuple[str, ...]  # town, city or drive of each recording, empty where its log does not say
     first_frames: NDArray[np.int64]  # (R + 1,) where each recording begins along F, and F
     stamps_ns: NDArray[np.int64]  # (F,) int64
     position_m: NDArray[np.float64]  # (F, 2) forward and left in the grid orientation of the frame's own recording
@@ -115,6 +116,7 @@ def stack_recordings(
         recordings=tuple(entry.name for entry in recordings),
         logs=tuple(entry.log for entry in recordings),
         digests=tuple(entry.digest for entry in recordings),
+        groups=tuple(entry.group for entry in recordings),
         first_frames=first_frames,
         stamps_ns=np.concatenate([entry.stamps_ns for entry in recordings]),
         position_m=np.concatenate([entry.position_m for entry in recordings]),
