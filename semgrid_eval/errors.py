@@ -29,6 +29,10 @@ class ResultError(InputError):
     """A result folder does not parse or does not belong where it is."""
 
 
+class DamageError(ResultError):
+    """A file that was kept is not what was written."""
+
+
 class MissingExtraError(SemgridError):
     """An optional dependency is not installed; the message names the extra to install."""
 

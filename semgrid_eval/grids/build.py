@@ -1,5 +1,6 @@
 """Grids of whole recordings: read a log once, make the grids of every sensor, keep them by digest."""
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -21,6 +22,8 @@ from semgrid_eval.motion import EgoMotion
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.sensors.kinds import read_points, synchronise
 from semgrid_eval.sensors.sensor import Points
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass
@@ -53,8 +56,10 @@ def build_grids(
     for log in logs:
         try:
             ready[log] = _only(read_recordings(_cache_file(log, folder, config), log), sensors)
-        except ResultError:
+        except ResultError as error:
             missing.append(log)  # not made yet, or damaged
+            if error.path and error.path.exists():
+                _log.warning("%s; the grids are made again", error)
         except SemgridError as error:
             data.failed[str(log)] = _about(log, error)
     data.reused = len(ready)

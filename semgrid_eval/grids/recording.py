@@ -50,7 +50,7 @@ def write_recordings(path: Path, recordings: Sequence[GridRecording]) -> None:
     for name, axis in _ALONG_FRAMES.items():
         arrays[name] = np.concatenate([getattr(recording, name) for recording in recordings], axis=axis)
     arrays["actors"] = np.concatenate(truth) if truth else np.zeros((0, *first.grids.shape[2:]), np.uint8)
-    write_arrays(path, arrays)
+    write_arrays(path, arrays, owner=_owner(path))
 
 
 def read_recordings(path: Path, log: Path) -> list[GridRecording]:
@@ -59,7 +59,7 @@ def read_recordings(path: Path, log: Path) -> list[GridRecording]:
     Raises:
         ResultError: the file is missing, damaged or lacks an array.
     """
-    arrays = read_arrays(path, ("log", "sensors", "names", "frames", "has_truth", *_ALONG_FRAMES, "actors"))
+    arrays = read_arrays(path, ("log", "sensors", "names", "frames", "has_truth", *_ALONG_FRAMES, "actors"), owner=_owner(path))
     digest, split, dataset, group, target = (str(value) for value in arrays["log"])
     ends, has_truth = np.cumsum(arrays["frames"])[:-1], arrays["has_truth"]
     parts = {name: np.split(arrays[name], ends, axis=axis) for name, axis in _ALONG_FRAMES.items()}
@@ -79,3 +79,8 @@ def read_recordings(path: Path, log: Path) -> list[GridRecording]:
         )
         for number, name in enumerate(arrays["names"])
     ]
+
+
+def _owner(path: Path) -> str:
+    """Return the digest in the name of a file, which says of what log and configuration it holds the grids."""
+    return path.stem.rpartition("-")[2]

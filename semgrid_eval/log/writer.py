@@ -14,7 +14,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.motion import EgoMotion
-from semgrid_eval.recording.png import read_header, with_palette
+from semgrid_eval.recording.png import PngHeader, require_pixels, with_palette
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 
 CHUNK_BYTES = 1 << 20
@@ -158,7 +158,7 @@ class MomentWriter:
             self._writer.write(topics.TRUE_ACTORS, codec.actors_message(now_ns, moment.actors), log_ns=now_ns)
 
     def _camera(self, camera: str, frame: CameraFrame) -> None:
-        header = read_header(frame.disparity_png)
+        header = self._whole(camera, topics.DISPARITY, frame.disparity_png, frame.stamp_ns)
         calibration = self._recording.calibrations[camera]
         known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, (header.width, header.height))
         self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
@@ -167,6 +167,7 @@ class MomentWriter:
             png: bytes | None = getattr(frame, picture)
             if png is None:
                 continue
+            self._whole(camera, channel, png, frame.stamp_ns)
             if channel in (topics.LABEL, topics.EXACT_LABEL):
                 png = with_palette(png, self._palette)
             if channel == topics.IMAGE:
@@ -174,3 +175,11 @@ class MomentWriter:
             message = codec.image_message(frame.stamp_ns, camera, png)
             self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes)
         self._writer.end_chunk()
+
+    def _whole(self, camera: str, channel: str, png: bytes, stamp_ns: int) -> PngHeader:
+        """Make sure that a picture can be decoded, so that no log holds another."""
+        try:
+            return require_pixels(png)
+        except InputError as error:
+            place = f"{self._recording.name}: {camera_topic(camera, channel)} at {stamp_ns} ns"
+            raise InputError(str(error), field=place) from error

@@ -34,6 +34,9 @@ def failures(runs: Sequence[Run]) -> list[Failure]:
     for run in runs:
         found += [Failure("row", row.name, reason) for row in run.rows for reason in row.failures]
         found += [Failure("log", *reason) for reason in sorted(run.record.failed_logs.items())]
+        tag = f" ({run.tag})" if run.tag else ""
+        found += [Failure(fault.kind, f"{fault.name}{tag}", fault.reason) for fault in run.faults]
+        found += [Failure("picture", *text.split(": ", 1)) for text in run.damaged_pictures]
     return found
 
 
