@@ -1,4 +1,4 @@
-"""Named arrays on disk: sealed, compressed npz files of bounded size, nothing pickled, equal arrays giving equal bytes."""
+"""Named arrays on disk: sealed npz files of bounded size, nothing pickled, equal arrays giving equal bytes."""
 
 import io
 import struct

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.places import fcntl, held_folder, hold, partial_of, put, restore
+from semgrid_eval.places import held_folder, hold, partial_of, put, restore
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -159,11 +159,11 @@ def open_regular(path: Path, *, limit: int = READ_LIMIT_BYTES) -> BinaryIO:
         InputError: it cannot be read, is something else than a file, or has more bytes than `limit`.
     """
     with reading(path):
-        stream = os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
-    found = os.fstat(stream.fileno())
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    found = os.fstat(descriptor)
     if stat.S_ISREG(found.st_mode) and found.st_size <= limit:
-        return stream
-    stream.close()
+        return os.fdopen(descriptor, "rb")
+    os.close(descriptor)
     large = f"has {found.st_size >> 20} MiB, and {limit >> 20} are allowed"
     raise InputError(large if stat.S_ISREG(found.st_mode) else "is not a regular file", path=path)
 

@@ -18,7 +18,8 @@ from semgrid_eval.grids.rasterise import Cells, add_points, no_points, rasterise
 from semgrid_eval.grids.recording import FORMAT_VERSION, GridRecording, read_recordings, write_recordings
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
-from semgrid_eval.motion import EgoMotion
+from semgrid_eval.log.topics import EGO_MOTION
+from semgrid_eval.motion import EgoMotion, MotionSample, implausible
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.sensors.kinds import read_points, synchronise
 from semgrid_eval.sensors.sensor import Points
@@ -103,7 +104,7 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
 
 
 def _stretches(reader: LogReader, config: GridConfig) -> Iterator["_Stretch"]:
-    motion = EgoMotion(reader.motion(), config.integrator)
+    motion = EgoMotion(_plausible(reader), config.integrator)
     observations = read_points(reader, config.sensors, config.class_by_label())
     snapshots = synchronise(observations, config.sensors, config.target[0])
     for number, first in enumerate(snapshots):
@@ -112,6 +113,14 @@ def _stretches(reader: LogReader, config: GridConfig) -> Iterator["_Stretch"]:
             stretch.add(*snapshot)
         if number == 0 or len(stretch) == config.stretch_frames:
             yield stretch  # the rest of a log that was cut is too short for the windows of the others
+
+
+def _plausible(reader: LogReader) -> Iterator[MotionSample]:
+    for sample in reader.motion():
+        if fault := implausible(sample):
+            place = f"{EGO_MOTION} at {sample.stamp_ns} ns: {fault[0]}"
+            raise LogError(fault[1], path=reader.path, field=place)
+        yield sample
 
 
 class _Stretch:
@@ -144,6 +153,7 @@ class _Stretch:
             split=reader.scene.split,
             dataset=reader.scene.dataset,
             group=reader.scene.group,
+            has_checksums=reader.has_checksums,
             sensors=tuple(self._config.rows),
             target=self._config.target_row,
             stamps_ns=stamps_ns,

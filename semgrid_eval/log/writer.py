@@ -12,8 +12,9 @@ from semgrid_eval import __version__
 from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError
 from semgrid_eval.log import codec, topics
+from semgrid_eval.log.container import MAX_STAMP_NS
 from semgrid_eval.log.topics import camera_topic
-from semgrid_eval.motion import EgoMotion
+from semgrid_eval.motion import EgoMotion, implausible
 from semgrid_eval.recording.png import PngHeader, require_pixels, with_palette
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 
@@ -134,6 +135,8 @@ class MomentWriter:
             raise InputError("holds no frame", field=self._recording.name)
 
     def _advance(self, stamp_ns: int, what: str) -> None:
+        if stamp_ns >= MAX_STAMP_NS:
+            raise InputError(f"{what} at {stamp_ns} ns is beyond 2^63 ns", field=f"{self._recording.name}: stamp_ns")
         if stamp_ns < self._last_ns:
             message = f"{what} at {stamp_ns} ns comes after {self._last_ns} ns"
             raise InputError(message, field=f"{self._recording.name}: stamp_ns")
@@ -142,6 +145,9 @@ class MomentWriter:
     def _motion(self, moment: Moment) -> None:
         for sample in moment.motion:
             self._advance(sample.stamp_ns, "motion sample")
+            if fault := implausible(sample):
+                place = f"{self._recording.name}: motion at {sample.stamp_ns} ns: {fault[0]}"
+                raise InputError(fault[1], field=place)
             self._ego_motion.add(sample)
             self._writer.write(topics.EGO_MOTION, codec.motion_message(sample), log_ns=sample.stamp_ns)
 

@@ -62,6 +62,7 @@ class _Guarded(Model):
         with one_line(cls._own_name), cls._own_file.present() if cls._own_file else nullcontext():
             yield
 
+
 class _GuardedNetwork(_Guarded, Network):
     """Stands before a network of one's own, also while it is trained."""
 

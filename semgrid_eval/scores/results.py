@@ -53,6 +53,7 @@ class LogRecord(Config):
     split: str
     dataset: str
     group: str = ""  # the town, city or drive that it belongs to; empty where it stands for itself
+    checksums: bool = True  # whether it has them; without, damage cannot be seen
     fingerprint: str | None = None  # of a benchmark's log: what is compared with the published ones
 
 

@@ -9,6 +9,7 @@ from support.toy_world import street
 
 from semgrid_eval.cli.main import cli, main
 from semgrid_eval.log.store import write_log
+from semgrid_eval.models.checkpoint import read_history, write_history
 from semgrid_eval.scores.results import read_run
 
 SMALL = {
@@ -95,7 +96,7 @@ def test_dry_run_counts_only_the_epochs_that_are_not_trained_yet(here):
     planned = [*arguments, "--out", "second", "--dry-run"]
     assert call(*planned).stdout.splitlines()[1].split("\t")[3:6] == ["0", "0", "0.0"]
     (history,) = (here / "trainings").glob("*/history.csv")
-    history.write_text("".join(history.read_text().splitlines(keepends=True)[:-1]))
+    write_history(history, read_history(history)[:-1])
     assert call(*planned).stdout.splitlines()[1].split("\t")[3:5] == ["3", "6"]
 
 

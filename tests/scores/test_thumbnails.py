@@ -23,7 +23,18 @@ from semgrid_eval.sensors.camera import CameraSensor
 TRACK = Track(-7, np.array([1, 2]), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]), np.arange(12.0).reshape(3, 4))
 FRAMES = {5: FramePictures(b"five", b"labels"), -3: FramePictures(), 9: FramePictures(label=b"nine")}
 PICTURES = LogPictures(TRACK, FRAMES, ("toy: /image at 5 ns is damaged",))
-NAMES = ("stamps_ns", "images", "image_ends", "labels", "label_ends", "start_ns", "track_ns", "track", "projection", "faults")
+NAMES = (
+    "stamps_ns",
+    "images",
+    "image_ends",
+    "labels",
+    "label_ends",
+    "start_ns",
+    "track_ns",
+    "track",
+    "projection",
+    "faults",
+)
 
 
 @settings(max_examples=30)

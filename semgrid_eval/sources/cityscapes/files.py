@@ -14,6 +14,7 @@ import numpy as np
 from semgrid_eval.classes import CITYSCAPES_LABELS, label_ids_from_train_ids
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import read_bytes
+from semgrid_eval.motion import implausible
 from semgrid_eval.recording.png import GRAY, PALETTE, PngHeader, decode_ids, encode_gray, require_pixels
 from semgrid_eval.recording.types import CameraCalibration, MotionSample
 
@@ -53,7 +54,10 @@ def read_vehicle(path: Path, stamp_ns: int) -> MotionSample:
     motion = {name: _number(content, path, field) for name, field in _MOTION_FIELDS.items()}
     given = {name: field for name, field in _GPS_FIELDS.items() if content.get(field) is not None}
     gps = {name: _number(content, path, field) for name, field in given.items()}
-    return MotionSample(stamp_ns=stamp_ns, **motion, **gps)
+    sample = MotionSample(stamp_ns=stamp_ns, **motion, **gps)
+    if fault := implausible(sample):
+        raise InputError(fault[1], path=path, field=_MOTION_FIELDS[fault[0]])
+    return sample
 
 
 def read_stamp(path: Path) -> int:

@@ -1,4 +1,5 @@
 import filecmp
+import json
 import os
 import re
 import subprocess
@@ -192,16 +193,19 @@ def lonely(tmp_path_factory):
         tmp_path_factory.mktemp("runs") / "run", rows=(FakeRow("DC", "BL"),), recordings=1, windows=1, truth=False
     )
     old = run / "report"
-    old.mkdir()
-    for name in ("report.json", "index.html", "old.txt"):
+    (old / "notes").mkdir(parents=True)
+    for name in ("index.html", "old.csv"):
         (old / name).touch()
+    (old / "report.json").write_text(json.dumps({"files": ["old.csv"]}))
+    (old / "notes" / "mine.txt").write_text("precious")
     return write_report(run)
 
 
-def test_an_old_report_in_the_default_place_is_replaced(lonely):
+def test_an_old_report_in_the_default_place_is_replaced_and_what_is_not_its_own_stays(lonely):
     assert lonely.parent.name == "report"
     assert (lonely.parent.parent / "run.json").is_file()
-    assert not (lonely.parent / "old.txt").exists()
+    assert not (lonely.parent / "old.csv").exists()
+    assert (lonely.parent / "notes" / "mine.txt").read_text() == "precious"
 
 
 def test_one_row_only(lonely):
