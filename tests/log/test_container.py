@@ -95,7 +95,7 @@ def test_any_flipped_bit_fails_the_check_of_the_whole_file(whole, tmp_path):
 def test_missing_file_and_folder_are_named(tmp_path):
     with pytest.raises(LogError, match=r"log\.mcap: cannot be read: No such file"):
         LogReader(tmp_path / "log.mcap")
-    with pytest.raises(LogError, match="cannot be read: Is a directory"):
+    with pytest.raises(LogError, match="is not a regular file"):
         LogReader(tmp_path)
 
 
