@@ -79,7 +79,11 @@ def held_folder(path: Path) -> Iterator[Path]:
 
 
 def restore(path: Path) -> None:
-    """Bring back the folder that `put` had moved aside when its process was killed."""
+    """Bring back the folder that `put` had moved aside when its process was killed, and remove what it was writing."""
+    for left in [each for each in path.parent.iterdir() if each.name.startswith(f".{path.name}.")]:
+        if _PART.fullmatch(left.name):
+            with suppress(OSError):
+                _remove_unless_held(left)
     if not path.exists() and _aside(path).is_dir():
         with suppress(OSError):
             _aside(path).replace(path)

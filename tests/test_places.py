@@ -78,7 +78,7 @@ def test_what_a_killed_process_was_writing_is_removed_and_what_others_write_stay
     for process in (dead, alive):
         assert process.stdout.readline() == b"writing\n"
     dead.send_signal(signal.SIGKILL)
-    dead.wait()
+    dead.communicate()
     assert len(list((tmp_path / "out").iterdir())) == 4
     (tmp_path / "out" / ".mine.part").touch()
     remove_stale(tmp_path)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from semgrid_eval.cli.console import progress, say
+from semgrid_eval.errors import printable
 
 if TYPE_CHECKING:
     from semgrid_eval.log.check import LogReport
@@ -38,7 +39,7 @@ def command(logs: tuple[Path, ...], *, strict: bool, as_json: bool) -> int:
     else:
         for report in reports:
             for finding in report.findings:
-                click.echo(f"{report.path}: {finding}")
+                click.echo(printable(f"{report.path}: {finding}"))
     bad = sum(not report.good or (strict and bool(report.findings)) for report in reports)
     say(f"{len(reports)} logs checked, {bad} with errors{' or warnings' if strict else ''}")
     return 1 if bad else 0

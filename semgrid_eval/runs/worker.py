@@ -93,6 +93,7 @@ class Worker:
             model, train_seconds = self._fitted(job)
             with self.stage(f"score {row.name}") as progress:
                 evaluation = evaluate(model, job.scored, mask_mode=row.mask_mode, spec=row.grid.spec, progress=progress)
+        self._keep_windows(job.scored, job.windows_id)  # code of one's own may have removed them
         record = self._result_record(job, model, train_seconds, evaluation.seconds)
         _keep_result(folder, record, evaluation, self._history(job), with_predictions=self._shows(seed))
         return job

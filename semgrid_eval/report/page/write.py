@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from semgrid_eval import __version__
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import InputError, printable
 from semgrid_eval.files import atomic_folder, locked
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.report.claims.claims import MARGIN, in_paper
@@ -106,7 +106,9 @@ def render_page(material: Material) -> str:
     examples = example_groups(runs, rows, found)
     shown = () if found is None else filter(None, (found.best, found.reference or found.rival))
     loader, strict = PackageLoader("semgrid_eval.report"), StrictUndefined
-    environment = Environment(loader=loader, autoescape=True, undefined=strict, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=strict, trim_blocks=True, lstrip_blocks=True, finalize=_shown
+    )
     environment.filters["svg_uri"] = lambda text: data_uri(text.encode(), "image/svg+xml")
     return environment.get_template("page.html.j2").render(
         style=Markup(class_style()) + _source("style.css") + _source("examples.css"),
@@ -149,6 +151,13 @@ def finding_view(tag: str, index: int, findings: Sequence[Finding]) -> dict[str,
     mine, end = [each for each in findings if each.run == tag], f"-{index}" if index else ""
     tested, missing = finding_table(f"findings{end}", mine), missing_table(f"not-run{end}", mine)
     return {"tag": tag, "sentence": sentence(mine), "tested": tested, "missing": missing}
+
+
+def _shown(value: object) -> object:
+    """Escape what cannot be printed in names, wherever they come from; texts of several lines keep them."""
+    if isinstance(value, Markup) or not isinstance(value, str):
+        return value
+    return "\n".join(map(printable, value.split("\n")))
 
 
 def _source(name: str) -> Markup:
