@@ -47,7 +47,7 @@ def read_arrays(
     Raises:
         ResultError: the file is missing, damaged, too large, lacks an array or belongs to another `owner`, if given.
     """
-    content = read_sealed(path, owner)
+    content = read_sealed(path, owner, limit=_ARRAY_LIMIT_BYTES)
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             sizes = {entry.filename.removesuffix(".npy"): entry.file_size for entry in archive.infolist()}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 DIGEST_CHARACTERS = 16
-READ_LIMIT_BYTES = 8 << 30
+READ_LIMIT_BYTES, JSON_LIMIT_BYTES = 64 << 30, 256 << 20
 _BLOCK_BYTES = 1 << 20
 
 
@@ -145,7 +145,7 @@ def read_json(path: Path) -> Any:  # noqa: ANN401 - anything that JSON can hold
     Raises:
         InputError: the file is missing, unreadable or not JSON.
     """
-    content = read_bytes(path)
+    content = read_bytes(path, limit=JSON_LIMIT_BYTES)
     try:
         return json.loads(content)
     except (ValueError, RecursionError) as error:
@@ -175,8 +175,8 @@ def reading(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", path=path) from error
-    except ValueError as error:  # of a name that no file can have
-        raise InputError(f"cannot be read: {error}", path=path) from error
+    except (ValueError, MemoryError) as error:  # of a name that no file can have, or a file that does not fit
+        raise InputError(f"cannot be read: {error or 'it does not fit into memory'}", path=path) from error
 
 
 def read_bytes(path: Path, *, limit: int = READ_LIMIT_BYTES) -> bytes:

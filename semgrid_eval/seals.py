@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from semgrid_eval.errors import DamageError, InputError, ResultError
-from semgrid_eval.files import atomic_file, read_bytes
+from semgrid_eval.files import JSON_LIMIT_BYTES, READ_LIMIT_BYTES, atomic_file, read_bytes
 
 _MARK = b"semgrid-eval seal "
 _BLANK = b"0" * 64
@@ -53,14 +53,14 @@ def check_seal(content: bytes, path: Path, owner: str | None = None) -> None:
         raise ResultError(f"belongs to another id ({found[1].decode()}, not {owner or _NOBODY})", path=path)
 
 
-def read_sealed(path: Path, owner: str | None = None) -> bytes:
-    """Read a sealed file whole.
+def read_sealed(path: Path, owner: str | None = None, *, limit: int = READ_LIMIT_BYTES) -> bytes:
+    """Read a sealed file of at most `limit` bytes whole.
 
     Raises:
         ResultError: it is missing, or as `check_seal` says.
     """
     try:
-        content = read_bytes(path)
+        content = read_bytes(path, limit=limit)
     except InputError as error:
         raise ResultError(str(error).removeprefix(f"{path}: "), path=path) from error
     check_seal(content, path, owner)
@@ -86,7 +86,7 @@ def read_sealed_json(path: Path, owner: str | None = None) -> dict[str, Any]:
     Raises:
         ResultError: it is missing, or as `check_seal` says.
     """
-    content = read_sealed(path, owner)
+    content = read_sealed(path, owner, limit=JSON_LIMIT_BYTES)
     try:
         value: dict[str, Any] = json.loads(content)
         del value[_JSON_KEY]

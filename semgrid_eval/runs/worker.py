@@ -16,6 +16,7 @@ from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
 from semgrid_eval.models.checkpoint import read_history, write_history
 from semgrid_eval.models.device import choose_precision, seeded
+from semgrid_eval.models.memory import require_room
 from semgrid_eval.models.model import Model, parameter_count
 from semgrid_eval.models.network import Network, NetworkSettings, seeded_network
 from semgrid_eval.models.registry import find_model, version_of
@@ -170,6 +171,7 @@ class Worker:
         """Return the job's model, ready to predict, and how many seconds gradients have trained it."""
         made, settings, training, seed = job.resolved.model, job.resolved.settings, job.training, job.seed or 0
         if training and issubclass(made, Network):
+            require_room(made, settings, job.row.given, self.device)
             network = seeded_network(made, settings, job.row.given, seed)
             train_it = partial(train, network, training.windows, seed=seed, device=self.device, folder=training.folder)
             with self.stage(f"train {job.row.name} (seed {seed})") as progress:
