@@ -25,7 +25,7 @@ from semgrid_eval.report.estimates.bootstrap import (
 )
 from semgrid_eval.report.estimates.paces import divisions
 from semgrid_eval.report.figures import categories, curves, settings
-from semgrid_eval.report.figures.curves import calibration_frame, training_frame
+from semgrid_eval.report.figures.curves import calibration_frame, timing_frame, training_frame
 from semgrid_eval.report.figures.settings import settings_frame
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
@@ -109,6 +109,7 @@ def write_numbers(folder: Path, material: Material) -> None:
         "calibration": calibration_frame(everywhere(material.everything, "calibration")),
         "settings": settings_frame(material.scores),
         "training": training_frame([row for run in runs for row in run.rows]),
+        "timings": timing_frame([row for run in runs for row in run.rows]),
         "windows": window_frame(runs),
     }
     for name, frame in frames.items():

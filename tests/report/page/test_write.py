@@ -14,6 +14,7 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import read_json
 from semgrid_eval.report.page.write import write_report
+from semgrid_eval.scores.results import read_run, write_run
 
 VOID = {"meta", "link", "img", "input", "br"}
 
@@ -277,3 +278,17 @@ def test_runs_with_different_windows_are_not_subtracted_and_the_page_says_why(tm
     assert "ED-DC (part) \N{MINUS SIGN} BL-DC (part)" in text
     assert "(part) \N{MINUS SIGN} ED-DC (whole)" not in text
     assert "BL-DC (part), ED-DC (part) the logs or their frames (against BL-DC (whole)) 4 4 shared" in text
+
+
+def test_names_that_would_move_a_cursor_are_escaped_on_the_page_and_in_its_files(tmp_path):
+    run = make_fake_run(tmp_path / "run", rows=(FakeRow("DC", "BL"),), recordings=2, windows=1)
+    record, odd = read_run(run), "\x1b[31m\u202ered"
+    (row,) = record.rows
+    rows = (row.model_copy(update={"name": odd, "label": odd}),)
+    write_run(run, record.model_copy(update={"title": odd, "rows": rows, "failed_logs": {odd: odd}}))
+    page = write_report(run)
+    for path in (page, *page.parent.rglob("*.csv"), *page.parent.rglob("*.md"), *page.parent.rglob("*.json")):
+        text = path.read_text()
+        assert "\x1b" not in text, path
+        assert "\u202e" not in text, path
+    assert "\\x1b[31m\\u202ered" in page.read_text()
