@@ -20,6 +20,7 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import EGO_MOTION
 from semgrid_eval.motion import EgoMotion, MotionSample, implausible
+from semgrid_eval.places import remove_stale
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.sensors.kinds import read_points, synchronise
 from semgrid_eval.sensors.sensor import Points
@@ -52,6 +53,7 @@ def build_grids(
     all sensors are made; with `sensors`, only those of these and of the target are read into memory.
     """
     data = GridDataSet()
+    remove_stale(folder)
     ready: dict[Path, list[GridRecording]] = {}
     missing: list[Path] = []
     for log in logs:

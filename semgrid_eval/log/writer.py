@@ -15,7 +15,7 @@ from semgrid_eval.log import codec, topics
 from semgrid_eval.log.container import MAX_STAMP_NS
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.motion import EgoMotion, implausible
-from semgrid_eval.recording.png import PngHeader, require_pixels, with_palette
+from semgrid_eval.recording.png import PngHeader, read_header, require_pixels, with_palette
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 
 CHUNK_BYTES = 1 << 20
@@ -185,7 +185,7 @@ class MomentWriter:
     def _whole(self, camera: str, channel: str, png: bytes, stamp_ns: int) -> PngHeader:
         """Make sure that a picture can be decoded, so that no log holds another."""
         try:
-            return require_pixels(png)
+            return read_header(png) if self._recording.encoded_here else require_pixels(png)
         except InputError as error:
             place = f"{self._recording.name}: {camera_topic(camera, channel)} at {stamp_ns} ns"
             raise InputError(str(error), field=place) from error

@@ -107,3 +107,4 @@ class Recording:
     moments: Callable[[], Iterator[Moment]]  # starts a new pass over the recording, in the order of time
     source_files: dict[str, bytes] = field(default_factory=dict)  # by attachment name (`front_camera.json`)
     group: str = ""  # the town, city or drive that it belongs to, with other recordings that may depend on it
+    encoded_here: bool = False  # whether this package encodes its pictures itself: others are decoded before they count

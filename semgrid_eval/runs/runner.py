@@ -56,7 +56,7 @@ def run_matrix(
     rows = wanted_rows(matrix, options.only)
     units, wanted = plan_units(matrix.rows, matrix.seed), plan_units(rows, matrix.seed)
     worker = make_worker(matrix, logs, out, options, stage)
-    _prepare(worker, options.grids)
+    _prepare(worker)
     outcomes: dict[str, Outcome] = {}
 
     def look_for_others() -> None:
@@ -85,9 +85,9 @@ def run_matrix(
     return keep_record()
 
 
-def _prepare(worker: Worker, grids: Path) -> None:
+def _prepare(worker: Worker) -> None:
     """Remove what runs that were killed have left half-written, and build all grids."""
-    for folder in (worker.out, worker.trainings, grids):
+    for folder in (worker.out, worker.trainings):
         remove_stale(folder)
     for data in worker.data:
         data.prepare()

@@ -114,6 +114,7 @@ def render_recording(plan: RecordingPlan) -> Recording:
         group=plan.name.partition("_")[0],  # the town: town03
         calibrations={CAMERA_NAME: calibration},
         source_digest=plan.digest,
+        encoded_here=True,
         moments=partial(_moments, plan),
         source_files={"plan.json": description.encode()},
     )
