@@ -1,6 +1,7 @@
 """The `semgrid-eval` command and the one place where errors become exit codes."""
 
 import importlib
+import logging
 import os
 import signal
 import sys
@@ -51,7 +52,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line; a user's mistake, or the system's refusal, ends it with one line and exit code 1 or 2."""
     _open_streams()
     try:
-        with _terminable():
+        with _terminable(), _warned():
             result: Any = cli.main(args=arguments, standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:
@@ -90,6 +91,22 @@ def _open_streams() -> None:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
+
+
+class _Warnings(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:
+        click.echo(f"Warning: {printable(record.getMessage())}", err=True)
+
+
+@contextmanager
+def _warned() -> Iterator[None]:
+    """Say inside the block what the package warns of."""
+    warnings, package = _Warnings(logging.WARNING), logging.getLogger("semgrid_eval")
+    package.addHandler(warnings)
+    try:
+        yield
+    finally:
+        package.removeHandler(warnings)
 
 
 @contextmanager
