@@ -41,7 +41,8 @@ def check_seal(content: bytes, path: Path, owner: str | None = None) -> None:
         DamageError: there is no seal, or the bytes are not those that were sealed.
         ResultError: it belongs to something else.
     """
-    found = _SEAL.match(content, content.rfind(_MARK)) if _MARK in content else None
+    at = content.rfind(_MARK)
+    found = _SEAL.match(content, at) if at >= 0 else None
     if found is None:
         raise DamageError("is damaged, or of another version: it has no seal", path=path)
     digest, view = hashlib.sha256(), memoryview(content)

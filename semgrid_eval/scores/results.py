@@ -228,9 +228,12 @@ def write_sums(folder: Path, sums: Sums, result_id: str = "") -> None:
     write_arrays(folder / SUMS_FILE, arrays, owner=result_id or folder.name)
 
 
-def read_sums(folder: Path, metric: str, partition: str) -> NDArray[np.int32] | None:
-    """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions."""
-    return _read_sums(folder, [(metric, partition)]).get((metric, partition))
+def read_sums(folder: Path, metric: str, partition: str, *, verify: bool = True) -> NDArray[np.int32] | None:
+    """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions.
+
+    Who has called `check_sums` before need not `verify` the file each time.
+    """
+    return _read_sums(folder, [(metric, partition)], verify=verify).get((metric, partition))
 
 
 def check_sums(folder: Path, windows: int) -> None:
@@ -241,11 +244,13 @@ def check_sums(folder: Path, windows: int) -> None:
             raise ResultError(fault, path=folder / SUMS_FILE, field=".".join(key))
 
 
-def _read_sums(folder: Path, keys: Sequence[tuple[str, str]]) -> dict[tuple[str, str], NDArray[np.int32]]:
+def _read_sums(
+    folder: Path, keys: Sequence[tuple[str, str]], *, verify: bool = True
+) -> dict[tuple[str, str], NDArray[np.int32]]:
     path, names = folder / SUMS_FILE, {key: ".".join(key) for key in keys}
     needed = tuple(name for key, name in names.items() if key[1] == "all")
     optional = tuple(name for name in names.values() if name not in needed)
-    found = read_arrays(path, needed, owner=folder.name, optional=optional)
+    found = read_arrays(path, needed, owner=folder.name, optional=optional, verify=verify)
     sums = {key: found[name] for key, name in names.items() if name in found}
     for (metric, partition), counted in sums.items():
         shape = (len(PARTITIONS[partition].regions), *METRICS[metric].shape)
