@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import ResultError
-from semgrid_eval.files import read_bytes
+from semgrid_eval.files import open_regular
 from semgrid_eval.seals import open_seal, read_sealed, write_sealed
 
 _ARRAY_LIMIT_BYTES = 8 << 30
@@ -55,9 +55,9 @@ def read_arrays(
     Raises:
         ResultError: the file is missing, damaged, too large, lacks an array or belongs to another `owner`, if given.
     """
-    content = (read_sealed if verify else _unverified)(path, owner, limit=_ARRAY_LIMIT_BYTES)
+    source = io.BytesIO(read_sealed(path, owner, limit=_ARRAY_LIMIT_BYTES)) if verify else open_regular(path)
     try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        with source, zipfile.ZipFile(source) as archive:
             sizes = {entry.filename.removesuffix(".npy"): entry.file_size for entry in archive.infolist()}
             if (size := sum(sizes.values())) > _ARRAY_LIMIT_BYTES:
                 raise ResultError(f"would need {size >> 20} MiB", path=path)
@@ -67,10 +67,6 @@ def read_arrays(
             return {name: _array(archive, name) for name in (*names, *optional) if name in sizes}
     except _DAMAGE as error:
         raise ResultError(f"cannot be read: {error}", path=path) from error
-
-
-def _unverified(path: Path, _owner: str | None, *, limit: int) -> bytes:
-    return read_bytes(path, limit=limit)
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
