@@ -32,5 +32,5 @@ def test_a_file_that_lacks_an_array_is_refused(tmp_path):
     write_recordings(tmp_path / "kept.npz", stretches())
     arrays = read_arrays(tmp_path / "kept.npz", ("log", "sensors", "names", "frames", "stamps_ns"))
     write_arrays(tmp_path / "kept.npz", arrays, owner="kept")
-    with pytest.raises(ResultError, match="has no array has_truth"):
+    with pytest.raises(ResultError, match="has no array has_checksums"):
         read_recordings(tmp_path / "kept.npz", Path("here.mcap"))
