@@ -1,4 +1,4 @@
-"""Named arrays on disk: compressed npz files with bounded sizes, nothing pickled, equal arrays giving equal bytes."""
+"""Named arrays on disk: sealed npz files of bounded size, nothing pickled, equal arrays giving equal bytes."""
 
 import io
 import struct
@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import ResultError
-from semgrid_eval.files import atomic_file
+from semgrid_eval.files import open_regular
+from semgrid_eval.seals import open_seal, read_sealed, write_sealed
 
 _ARRAY_LIMIT_BYTES = 8 << 30
 # All that zipfile and numpy were seen to raise on damaged files.
@@ -22,25 +23,41 @@ _DAMAGE = (
 )
 
 
-def write_arrays(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
-    """Write arrays as a compressed npz, atomically, the same arrays always giving the same bytes."""
-    with atomic_file(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=4) as archive:
+def write_arrays(path: Path, arrays: dict[str, NDArray[Any]], *, owner: str = "") -> None:
+    """Write arrays as a compressed npz, atomically, the same arrays always giving the same bytes.
+
+    `owner` is the id of what they belong to.
+    """
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED, compresslevel=4) as archive:
+        archive.comment = open_seal(owner).encode()
         for name, array in arrays.items():
             buffer = io.BytesIO()
             np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
             entry = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, buffer.getvalue())
+    write_sealed(path, content.getvalue())
 
 
-def read_arrays(path: Path, names: tuple[str, ...], *, optional: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
+def read_arrays(
+    path: Path,
+    names: tuple[str, ...],
+    *,
+    owner: str | None = None,
+    optional: tuple[str, ...] = (),
+    verify: bool = True,
+) -> dict[str, NDArray[Any]]:
     """Read the named arrays of an npz, and those of `optional` that it has; sizes bounded, nothing pickled.
 
+    Who has just compared the file with its seal need not do it again (`verify`).
+
     Raises:
-        ResultError: the file is missing, damaged, too large or lacks an array.
+        ResultError: the file is missing, damaged, too large, lacks an array or belongs to another `owner`, if given.
     """
+    source = io.BytesIO(read_sealed(path, owner, limit=_ARRAY_LIMIT_BYTES)) if verify else open_regular(path)
     try:
-        with zipfile.ZipFile(path) as archive:
+        with source, zipfile.ZipFile(source) as archive:
             sizes = {entry.filename.removesuffix(".npy"): entry.file_size for entry in archive.infolist()}
             if (size := sum(sizes.values())) > _ARRAY_LIMIT_BYTES:
                 raise ResultError(f"would need {size >> 20} MiB", path=path)

@@ -9,9 +9,12 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from semgrid_eval.errors import ConfigError
+from semgrid_eval.errors import ConfigError, InputError
+from semgrid_eval.files import read_bytes
 
 _YAML_LIMIT_BYTES = 1 << 20
+_LONGEST_NUMBER = 40  # characters
+_SHOWN = 20
 
 
 class Config(BaseModel):
@@ -58,7 +61,9 @@ class _StrictLoader(yaml.SafeLoader):
     def construct_int(self, node: yaml.ScalarNode) -> int:
         """Read a whole number: decimal, `0o17` or `0x1f`."""
         if re.match(r"[-+]?0[0-9]", node.value):
-            raise _at(node, f"{node.value} is ambiguous: write it without the leading 0, or in quotes")
+            raise _at(node, f"{node.value[:_SHOWN]} is ambiguous: write it without the leading 0, or in quotes")
+        if len(node.value) > _LONGEST_NUMBER:
+            raise _at(node, f"{node.value[:_SHOWN]}... is larger than any number that is needed")
         return int(node.value, 0)
 
 
@@ -134,11 +139,11 @@ def load_yaml(path: Path) -> Any:  # noqa: ANN401 - anything that YAML can hold
         ConfigError: the file cannot be read or is not YAML.
     """
     try:
-        if path.stat().st_size > _YAML_LIMIT_BYTES:
-            raise ConfigError("is larger than 1 MiB, which no configuration needs", path=path)
-        return yaml.load(path.read_text(encoding="utf-8"), Loader=_StrictLoader)
-    except OSError as error:
-        raise ConfigError(f"cannot be read: {error.strerror or error}", path=path) from error
+        content = read_bytes(path, limit=_YAML_LIMIT_BYTES)
+    except InputError as error:
+        raise ConfigError(str(error).removeprefix(f"{path}: "), path=path) from error
+    try:
+        return yaml.load(content.decode(), Loader=_StrictLoader)
     except yaml.MarkedYAMLError as error:
         place = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
         raise ConfigError(f"is not valid YAML: {place}{error.problem}", path=path) from error

@@ -3,6 +3,13 @@
 from pathlib import Path
 
 
+def printable(text: str) -> str:
+    """Write characters that end a line, move a cursor or change the order of others as escapes, as Python does."""
+    if text.isprintable():
+        return text
+    return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
+
+
 class SemgridError(Exception):
     """Base of every error that is reported to the user as one line, without a traceback."""
 
@@ -14,7 +21,7 @@ class InputError(SemgridError):
         self.path = None if path is None else Path(path)
         self.field = field
         where = [str(part) for part in (path, field) if part is not None]
-        super().__init__(": ".join([*where, " ".join(message.split())]))
+        super().__init__(printable(": ".join([*where, " ".join(message.split())])))
 
 
 class ConfigError(InputError):
@@ -27,6 +34,10 @@ class LogError(InputError):
 
 class ResultError(InputError):
     """A result folder does not parse or does not belong where it is."""
+
+
+class DamageError(ResultError):
+    """A file that was kept is not what was written."""
 
 
 class MissingExtraError(SemgridError):

@@ -1,28 +1,23 @@
-"""Atomic output and content digests: nothing half-written is ever seen under its final name."""
+"""Atomic output, reading within bounds, and digests: nothing half-written is ever seen under its final name."""
 
 import hashlib
 import io
 import json
 import os
-import secrets
-import shutil
-import tempfile
+import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.places import held_folder, hold, partial_of, put, restore
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
-
 DIGEST_CHARACTERS = 16
+READ_LIMIT_BYTES, JSON_LIMIT_BYTES = 64 << 30, 256 << 20
 _BLOCK_BYTES = 1 << 20
 
 
@@ -33,20 +28,19 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
     Raises:
         InputError: the file cannot be written; errors of the block that are not about this file stay what they are.
     """
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    with _writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial, output = _open_partial(path)
     try:
-        with _writing(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            output = _Output(partial, path)
         with io.BufferedWriter(output) as stream:
             yield stream
             stream.flush()
             with _writing(path):
                 os.fsync(stream.fileno())
-        with _writing(path):
-            partial.replace(path)
+            with _writing(path):
+                partial.replace(path)
     finally:
-        with suppress(OSError):  # it is gone after success, and its folder may never have been one
+        with suppress(OSError):  # it is gone after success, and its folder may have been removed
             partial.unlink()
 
 
@@ -55,11 +49,20 @@ class _Output(io.FileIO):
 
     def __init__(self, partial: Path, path: Path) -> None:
         self._path = path
-        super().__init__(partial, "wb")
+        super().__init__(partial, "xb")
 
     def write(self, data: "ReadableBuffer", /) -> int:
         with _writing(self._path):
             return super().write(data)
+
+
+def _open_partial(path: Path) -> tuple[Path, _Output]:
+    while True:
+        partial = partial_of(path)
+        output = _Output(partial, path)
+        if hold(output.fileno()):
+            return partial, output
+        output.close()
 
 
 @contextmanager
@@ -71,22 +74,29 @@ def _writing(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path, name: str = ".lock") -> Iterator[None]:
     """Let one process at a time into the block for a folder, which is made if need be; a lock ends with its process.
 
-    Where the system or the folder's file system has no locks, nobody waits.
+    The file `name` there is what processes wait for; nothing of it is left. Where the system or the folder's file
+    system has no locks, nobody waits.
 
     Raises:
         InputError: the folder cannot be written to.
     """
-    with _writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        stream = (folder / ".lock").open("ab")
+    stream = None
+    while stream is None:
+        with _writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            stream = (folder / name).open("ab")
+        if not hold(stream.fileno()):  # whoever held it has removed it
+            stream.close()
+            stream = None
     with stream:
-        if fcntl is not None:
+        try:
+            yield
+        finally:
             with suppress(OSError):
-                fcntl.flock(stream, fcntl.LOCK_EX)
-        yield
+                (folder / name).unlink()
 
 
 @contextmanager
@@ -97,21 +107,25 @@ def atomic_folder(path: Path) -> Iterator[Path]:
         InputError: the folder cannot be written to; errors of the block that name a file elsewhere stay what they are.
     """
     with _writing(path):
+        path = path.resolve() if path.is_symlink() else path
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent))
-    try:
-        partial.chmod(0o755)
+        restore(path)
+    with _filling(path), held_folder(path) as partial:
         yield partial
         with _writing(path):
-            if path.exists():
-                shutil.rmtree(path)
-            partial.replace(path)
+            put(partial, path)
+
+
+@contextmanager
+def _filling(path: Path) -> Iterator[None]:
+    """Name a folder where a file below its temporary twin cannot be written."""
+    try:
+        yield
     except OSError as error:
-        if error.filename is None or Path(os.fsdecode(error.filename)).is_relative_to(partial):
+        beside = path.with_name(f".{path.name}.")
+        if error.filename is None or os.fsdecode(error.filename).startswith(str(beside)):
             raise InputError(f"cannot be written: {_reason(error)}", path=path) from error
         raise
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -131,12 +145,44 @@ def read_json(path: Path) -> Any:  # noqa: ANN401 - anything that JSON can hold
     Raises:
         InputError: the file is missing, unreadable or not JSON.
     """
+    content = read_bytes(path, limit=JSON_LIMIT_BYTES)
     try:
-        return json.loads(path.read_bytes())
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}", path=path) from error
+        return json.loads(content)
     except (ValueError, RecursionError) as error:
         raise InputError(f"is not valid JSON: {error}", path=path) from error
+
+
+def open_regular(path: Path, *, limit: int = READ_LIMIT_BYTES) -> BinaryIO:
+    """Open a regular file to be read; a pipe or a device, which may never end, is refused before it is waited for.
+
+    Raises:
+        InputError: it cannot be read, is something else than a file, or has more bytes than `limit`.
+    """
+    with reading(path):
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    found = os.fstat(descriptor)
+    if stat.S_ISREG(found.st_mode) and found.st_size <= limit:
+        return os.fdopen(descriptor, "rb")
+    os.close(descriptor)
+    large = f"has {found.st_size >> 20} MiB, and {limit >> 20} are allowed"
+    raise InputError(large if stat.S_ISREG(found.st_mode) else "is not a regular file", path=path)
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turn an error of the system into one line that names the file."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", path=path) from error
+    except (ValueError, MemoryError) as error:  # of a name that no file can have, or a file that does not fit
+        raise InputError(f"cannot be read: {error or 'it does not fit into memory'}", path=path) from error
+
+
+def read_bytes(path: Path, *, limit: int = READ_LIMIT_BYTES) -> bytes:
+    """Read a whole regular file; an InputError is raised as `open_regular` does."""
+    with open_regular(path, limit=limit) as stream, reading(path):
+        return stream.read()
 
 
 def digest_value(value: Any) -> str:  # noqa: ANN401 - anything that JSON can hold
@@ -145,21 +191,18 @@ def digest_value(value: Any) -> str:  # noqa: ANN401 - anything that JSON can ho
     return hashlib.sha256(text.encode()).hexdigest()[:DIGEST_CHARACTERS]
 
 
-def digest_files(paths: Iterable[Path]) -> str:
+def digest_files(paths: Iterable[Path], *, limit: int = READ_LIMIT_BYTES) -> str:
     """Digest the bytes of several files in the given order (16 hexadecimal characters).
 
     Raises:
-        InputError: a file cannot be read.
+        InputError: a file cannot be read, is not a regular file, or has more bytes than `limit`.
     """
     total = hashlib.sha256()
     for path in paths:
         part = hashlib.sha256()
-        try:
-            with path.open("rb") as stream:
-                while block := stream.read(_BLOCK_BYTES):
-                    part.update(block)
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror or error}", path=path) from error
+        with open_regular(path, limit=limit) as stream, reading(path):
+            while block := stream.read(_BLOCK_BYTES):
+                part.update(block)
         total.update(part.digest())
     return total.hexdigest()[:DIGEST_CHARACTERS]
 

@@ -12,6 +12,10 @@ from semgrid_eval.geometry import SE2
 Integrator = Literal["euler", "arc"]
 EXTRAPOLATION_LIMIT_S = 0.25
 _NS_PER_S = 1e9
+# What a road vehicle can plausibly do; beyond: a wrong unit or sign, or a broken sensor.
+SPEED_MPS = (-15.0, 70.0)
+YAW_RATE_RADPS = (-1.5, 1.5)
+LIMITS = {"speed_mps": (SPEED_MPS, "m/s"), "yaw_rate_radps": (YAW_RATE_RADPS, "rad/s")}
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,15 @@ class MotionSample:
     latitude_deg: float | None = None
     longitude_deg: float | None = None
     heading_deg: float | None = None  # clockwise from north, as GPS gives it
+
+
+def implausible(sample: MotionSample) -> tuple[str, str] | None:
+    """Name the field of a sample that no road vehicle can have, and say why; None where there is none."""
+    for name, ((low, high), unit) in LIMITS.items():
+        value: float = getattr(sample, name)
+        if not low <= value <= high:  # NaN is not, either
+            return name, f"{value:g} {unit} is not within {low:g} to {high:g}"
+    return None
 
 
 @dataclass(frozen=True)

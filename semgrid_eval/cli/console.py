@@ -10,14 +10,15 @@ import click
 from rich import progress as rich
 from rich.console import Console
 
+from semgrid_eval.errors import printable
 from semgrid_eval.progress import Progress
 
 PLAIN_LINE_INTERVAL_S = 10.0
 
 
 def say(text: str) -> None:
-    """Print one line of status on stderr."""
-    click.echo(text, err=True)
+    """Print one line of status on stderr, whatever names are in it."""
+    click.echo(printable(text), err=True)
 
 
 def command_line() -> str:
@@ -44,7 +45,7 @@ def _bar(label: str) -> Iterator[Progress]:
         task = bars.add_task(label, total=None, message="")
 
         def update(done: int, total: int, message: str = "") -> None:
-            bars.update(task, completed=done, total=total, message=message)
+            bars.update(task, completed=done, total=total, message=printable(message))
 
         yield update
 

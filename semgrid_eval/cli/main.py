@@ -1,17 +1,19 @@
 """The `semgrid-eval` command and the one place where errors become exit codes."""
 
 import importlib
+import logging
+import os
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
+from contextlib import contextmanager, suppress
+from typing import Any, NoReturn
 
 import click
 
 from semgrid_eval import __version__
-from semgrid_eval.errors import SemgridError
+from semgrid_eval.errors import SemgridError, printable
 
 _COMMANDS = ("convert", "check", "segment", "grids", "run", "report", "play", "demo", "bench")
 """Modules of `semgrid_eval.cli`."""
@@ -47,20 +49,64 @@ def cli() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; a user's mistake ends it with one line and exit code 1 or 2."""
+    """Run the command line; a user's mistake, or the system's refusal, ends it with one line and exit code 1 or 2."""
+    _open_streams()
     try:
-        with _terminable():
+        with _terminable(), _warned():
             result: Any = cli.main(args=arguments, standalone_mode=False)
+        sys.stdout.flush()
     except click.ClickException as error:
-        error.show()
-        sys.exit(error.exit_code)
+        with suppress(OSError):
+            error.show()
+        _leave("", error.exit_code)
     except SemgridError as error:
-        click.echo(f"Error: {error}", err=True)
-        sys.exit(1)
+        _leave(f"Error: {printable(str(error))}", 1)
     except (KeyboardInterrupt, click.Abort) as stop:
-        click.echo(f"\nStopped{stop}.", err=True)  # the terminal shows ^C in the line before
-        sys.exit(130)
+        _leave(f"\nStopped{stop}.", 130)  # the terminal shows ^C in the line before
+    except OSError as error:
+        place = "the output" if error.filename is None else printable(os.fsdecode(error.filename))
+        _leave("" if isinstance(error, BrokenPipeError) else f"Error: {place}: {error.strerror or error}", 1)
     sys.exit(result if isinstance(result, int) else 0)
+
+
+def _leave(text: str, code: int) -> NoReturn:
+    """Say one line, if anybody listens, and end; what could not be printed is not tried again."""
+    if text:
+        with suppress(OSError):
+            click.echo(text, err=True)
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    sys.exit(code)
+
+
+def _open_streams() -> None:
+    """Let the three standard streams lead somewhere: no file of ours may take the number of one that was closed."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
+
+
+class _Warnings(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:
+        click.echo(f"Warning: {printable(record.getMessage())}", err=True)
+
+
+@contextmanager
+def _warned() -> Iterator[None]:
+    """Say inside the block what the package warns of."""
+    warnings, package = _Warnings(logging.WARNING), logging.getLogger("semgrid_eval")
+    package.addHandler(warnings)
+    try:
+        yield
+    finally:
+        package.removeHandler(warnings)
 
 
 @contextmanager

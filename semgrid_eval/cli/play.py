@@ -14,14 +14,18 @@ from semgrid_eval.cli.console import progress, say
 @click.option("--logs", type=click.Path(path_type=Path), help="The run's logs: adds pictures and the vehicle's way.")
 @click.option("--recording", help="The recording to play.  [default: the first]")
 @click.option("--all", "every_recording", is_flag=True, help="Play all recordings, one after the other.")
-def command(run: Path, row: str, out: Path, logs: Path | None, recording: str | None, *, every_recording: bool) -> None:
+@click.option("--force", is_flag=True, help="Replace --out and the layout beside it, whatever they are.")
+def command(
+    run: Path, row: str, out: Path, logs: Path | None, recording: str | None, *, every_recording: bool, force: bool
+) -> None:
     """Write target, prediction, certainty, mask and inputs of a ROW's scored windows as an MCAP log.
 
     Grids are foxglove.Grid messages, which Foxglove and Lichtblick draw, and beside them, under /exact, the class ids
     as they are scored. Their log time is the target's time, their publish time that of the last input. Inputs are moved
     to the target's time, also those of a row without translation, whose model saw them not moved. With --all,
     recordings follow each other a second apart: the first keeps its times, those of the others are shifted. A layout
-    for the viewer is written beside the log. Prints the path of the log.
+    for the viewer is written beside the log. An earlier log of this command is replaced, with its layout unless that
+    was changed; nothing else is. Prints the path of the log.
     """
     from semgrid_eval.playback.write import write_playback
 
@@ -29,7 +33,12 @@ def command(run: Path, row: str, out: Path, logs: Path | None, recording: str | 
         raise click.UsageError("--recording names one recording, --all plays all of them")
     with progress("play") as shown:
         written = write_playback(
-            run, row, out, logs=logs, recording=recording, every_recording=every_recording, progress=shown
+            *(run, row, out),
+            logs=logs,
+            recording=recording,
+            every_recording=every_recording,
+            force=force,
+            progress=shown,
         )
     say(f"layout for Foxglove or Lichtblick: {written.layout}")
     click.echo(written.log)

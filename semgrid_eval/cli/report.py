@@ -5,7 +5,7 @@ from typing import Literal
 
 import click
 
-from semgrid_eval.cli.console import progress
+from semgrid_eval.cli.console import progress, say
 
 
 @click.command("report", epilog="Example: semgrid-eval report runs/first")
@@ -18,13 +18,18 @@ from semgrid_eval.cli.console import progress
     show_default=True,
     help="What intervals resample first: recordings, or the towns, cities or drives that they belong to.",
 )
-def command(runs: tuple[Path, ...], out: Path | None, resample: Literal["recordings", "groups"]) -> None:
+def command(runs: tuple[Path, ...], out: Path | None, resample: Literal["recordings", "groups"]) -> int:
     """Write one self-contained HTML page, CSV tables and figures from what RUN left on disk.
 
-    Prints the path of the page. Several runs are shown side by side, with their differences.
+    Prints the path of the page. Several runs are shown side by side, with their differences. Files of RUN that are
+    damaged or lost are named, here and on the page, and the exit code is then 1.
     """
     from semgrid_eval.report.page.write import write_report  # here, so that `--help` does not wait for matplotlib
 
+    damages = list[str]()
     with progress("reading results") as shown:
-        page = write_report(runs, out, resample=resample, progress=shown)
+        page = write_report(runs, out, resample=resample, progress=shown, damaged=damages.append)
+    for damage in damages:
+        say(f"Error: {damage}")
     click.echo(page)
+    return 1 if damages else 0

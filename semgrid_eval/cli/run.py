@@ -8,6 +8,7 @@ import click
 
 from semgrid_eval.cli.console import command_line, progress, say
 from semgrid_eval.cli.options import FOLDER, THERE, chosen_executor, device_option, executor_options, workers_option
+from semgrid_eval.errors import printable
 from semgrid_eval.executors import local_executor
 from semgrid_eval.ray_executor import LOCAL
 
@@ -106,7 +107,8 @@ def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -
     for unit in units:
         state = unit.failure or ("done" if unit.done else "to do")
         numbers = (unit.seed if unit.seed is not None else "-", unit.windows, unit.updates, unit.samples)
-        click.echo("\t".join(map(str, (",".join(unit.rows), *numbers, f"{unit.seconds / 60:.1f}", state))))
+        cells = (",".join(unit.rows), *numbers, f"{unit.seconds / 60:.1f}", state)
+        click.echo("\t".join(printable(str(cell)) for cell in cells))
     at_once = options.executor.parallel
     minutes = sum(unit.seconds for unit in units) / 60 / at_once
     say(f"About {minutes:.0f} minutes on this machine, {at_once} at a time.")

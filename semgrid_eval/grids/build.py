@@ -1,5 +1,6 @@
 """Grids of whole recordings: read a log once, make the grids of every sensor, keep them by digest."""
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,10 +18,14 @@ from semgrid_eval.grids.rasterise import Cells, add_points, no_points, rasterise
 from semgrid_eval.grids.recording import FORMAT_VERSION, GridRecording, read_recordings, write_recordings
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
-from semgrid_eval.motion import EgoMotion
+from semgrid_eval.log.topics import EGO_MOTION
+from semgrid_eval.motion import EgoMotion, MotionSample, implausible
+from semgrid_eval.places import remove_stale
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.sensors.kinds import read_points, synchronise
 from semgrid_eval.sensors.sensor import Points
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass
@@ -48,13 +53,16 @@ def build_grids(
     all sensors are made; with `sensors`, only those of these and of the target are read into memory.
     """
     data = GridDataSet()
+    remove_stale(folder)
     ready: dict[Path, list[GridRecording]] = {}
     missing: list[Path] = []
     for log in logs:
         try:
             ready[log] = _only(read_recordings(_cache_file(log, folder, config), log), sensors)
-        except ResultError:
+        except ResultError as error:
             missing.append(log)  # not made yet, or damaged
+            if error.path and error.path.exists():
+                _log.warning("%s; the grids are made again", error)
         except SemgridError as error:
             data.failed[str(log)] = _about(log, error)
     data.reused = len(ready)
@@ -98,7 +106,7 @@ def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
 
 
 def _stretches(reader: LogReader, config: GridConfig) -> Iterator["_Stretch"]:
-    motion = EgoMotion(reader.motion(), config.integrator)
+    motion = EgoMotion(_plausible(reader), config.integrator)
     observations = read_points(reader, config.sensors, config.class_by_label())
     snapshots = synchronise(observations, config.sensors, config.target[0])
     for number, first in enumerate(snapshots):
@@ -107,6 +115,14 @@ def _stretches(reader: LogReader, config: GridConfig) -> Iterator["_Stretch"]:
             stretch.add(*snapshot)
         if number == 0 or len(stretch) == config.stretch_frames:
             yield stretch  # the rest of a log that was cut is too short for the windows of the others
+
+
+def _plausible(reader: LogReader) -> Iterator[MotionSample]:
+    for sample in reader.motion():
+        if fault := implausible(sample):
+            place = f"{EGO_MOTION} at {sample.stamp_ns} ns: {fault[0]}"
+            raise LogError(fault[1], path=reader.path, field=place)
+        yield sample
 
 
 class _Stretch:
@@ -139,6 +155,7 @@ class _Stretch:
             split=reader.scene.split,
             dataset=reader.scene.dataset,
             group=reader.scene.group,
+            has_checksums=reader.has_checksums,
             sensors=tuple(self._config.rows),
             target=self._config.target_row,
             stamps_ns=stamps_ns,

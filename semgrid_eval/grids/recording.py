@@ -34,6 +34,7 @@ class GridRecording:
     # None where the log does not hold the truth.
     actors: NDArray[np.uint8] | None = None
     group: str = ""  # the town, city or drive that the log belongs to; empty where it does not say
+    has_checksums: bool = True  # whether the log has them, so that damage can be seen
 
 
 def write_recordings(path: Path, recordings: Sequence[GridRecording]) -> None:
@@ -42,6 +43,7 @@ def write_recordings(path: Path, recordings: Sequence[GridRecording]) -> None:
     truth = [recording.actors for recording in recordings if recording.actors is not None]
     arrays: dict[str, NDArray[np.generic]] = {
         "log": np.array([first.digest, first.split, first.dataset, first.group, first.target]),
+        "has_checksums": np.array([first.has_checksums]),
         "sensors": np.array(first.sensors),
         "names": np.array([recording.name for recording in recordings]),
         "frames": np.array([len(recording.stamps_ns) for recording in recordings]),
@@ -50,7 +52,7 @@ def write_recordings(path: Path, recordings: Sequence[GridRecording]) -> None:
     for name, axis in _ALONG_FRAMES.items():
         arrays[name] = np.concatenate([getattr(recording, name) for recording in recordings], axis=axis)
     arrays["actors"] = np.concatenate(truth) if truth else np.zeros((0, *first.grids.shape[2:]), np.uint8)
-    write_arrays(path, arrays)
+    write_arrays(path, arrays, owner=_owner(path))
 
 
 def read_recordings(path: Path, log: Path) -> list[GridRecording]:
@@ -59,7 +61,11 @@ def read_recordings(path: Path, log: Path) -> list[GridRecording]:
     Raises:
         ResultError: the file is missing, damaged or lacks an array.
     """
-    arrays = read_arrays(path, ("log", "sensors", "names", "frames", "has_truth", *_ALONG_FRAMES, "actors"))
+    arrays = read_arrays(
+        path,
+        ("log", "has_checksums", "sensors", "names", "frames", "has_truth", *_ALONG_FRAMES, "actors"),
+        owner=_owner(path),
+    )
     digest, split, dataset, group, target = (str(value) for value in arrays["log"])
     ends, has_truth = np.cumsum(arrays["frames"])[:-1], arrays["has_truth"]
     parts = {name: np.split(arrays[name], ends, axis=axis) for name, axis in _ALONG_FRAMES.items()}
@@ -72,6 +78,7 @@ def read_recordings(path: Path, log: Path) -> list[GridRecording]:
             split=split,
             dataset=dataset,
             group=group,
+            has_checksums=bool(arrays["has_checksums"][0]),
             sensors=tuple(str(sensor) for sensor in arrays["sensors"]),
             target=target,
             actors=next(truth) if has_truth[number] else None,
@@ -79,3 +86,8 @@ def read_recordings(path: Path, log: Path) -> list[GridRecording]:
         )
         for number, name in enumerate(arrays["names"])
     ]
+
+
+def _owner(path: Path) -> str:
+    """Return the digest in the name of a file, which says of what log and configuration it holds the grids."""
+    return path.stem.rpartition("-")[2]

@@ -14,12 +14,10 @@ from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.log import topics
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.motion import LIMITS
 from semgrid_eval.recording.png import decode_gray, read_header
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame, MotionSample, Quantity
 
-# What a road vehicle can plausibly do; beyond: a wrong unit or sign, or a broken sensor.
-SPEED_MPS = (-15.0, 70.0)
-YAW_RATE_RADPS = (-1.5, 1.5)
 ACCELERATION_MPS2 = (-20.0, 20.0)
 VALID_DISPARITY = 0.02
 GAP_PERIODS = 1.5
@@ -83,6 +81,7 @@ def check_log(path: Path) -> LogReport:
         with LogReader(path) as log:
             log.verify()
             conditions = log.conditions()
+            log.attachments()
             stamps_ns = log.stamps_ns()
             for finding in _findings(log, stamps_ns):  # one by one: those before damage count as well
                 findings.append(finding)
@@ -169,8 +168,7 @@ def _coverage(log: LogReader, stamps_ns: dict[str, list[int]]) -> Iterator[Findi
 
 
 def _motion(samples: list[MotionSample]) -> Iterator[Finding]:
-    ranges = (("speed_mps", SPEED_MPS, "m/s"), ("yaw_rate_radps", YAW_RATE_RADPS, "rad/s"))
-    for field, (low, high), unit in ranges:
+    for field, ((low, high), unit) in LIMITS.items():
         values = [getattr(sample, field) for sample in samples]
         worst = max(values, key=lambda value: max(low - value, value - high), default=0.0)
         if not low <= worst <= high:

@@ -35,6 +35,9 @@ CONDITIONS_RECORD = "semgrid.conditions"
 """The metadata record of a recording's conditions, each as `0.31 px`; only where the source has some to tell."""
 FORMAT_VERSION = 1
 _NS_PER_S = 1_000_000_000
+_MAX_STAMP_NS = 1 << 63
+_MAX_NAME_BYTES = 200
+_SHOWN = 40
 _GPS_FIELDS = ("latitude_deg", "longitude_deg", "heading_deg")
 _INTRINSICS = ("fx_px", "fy_px", "u0_px", "v0_px")
 _EXTRINSICS = ("x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad")
@@ -80,8 +83,7 @@ class Scene:
         if given.get("format_version") != str(FORMAT_VERSION):
             raise ValueError(f"its format version is {given.get('format_version')}; {FORMAT_VERSION} can be read")
         for key in ("name", "split"):
-            if given[key] in ("", "..") or PurePath(given[key]).name != given[key]:
-                raise ValueError(f"its {key} {given[key]!r} is not a file name")
+            require_file_name(given[key], key)
         words = {name: given[name] for name in ("name", "dataset", "split", "source_digest")}
         cameras, class_names = (tuple(json.loads(given[name])) for name in ("cameras", "class_names"))
         return cls(**words, cameras=cameras, class_names=class_names, group=given.get("group", ""))
@@ -102,14 +104,33 @@ def read_conditions(entries: Mapping[str, str]) -> dict[str, Quantity]:
     return {name: Quantity(json.loads(value), unit) for name, (value, _, unit) in parts.items()}
 
 
+def require_file_name(text: str, what: str) -> None:
+    """Make sure that a name can be that of a file, with an ending and whatever is put before it.
+
+    Raises:
+        ValueError: it cannot.
+    """
+    can_be = text not in ("", "..") and PurePath(text).name == text and "\0" not in text
+    if not can_be or len(text.encode(errors="replace")) > _MAX_NAME_BYTES:
+        shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+        raise ValueError(f"its {what} {shown!r} is not a file name of at most {_MAX_NAME_BYTES} bytes")
+
+
 def timestamp(stamp_ns: int) -> Timestamp:
     """Write integer nanoseconds as seconds and nanoseconds."""
     return Timestamp(seconds=stamp_ns // _NS_PER_S, nanos=stamp_ns % _NS_PER_S)
 
 
 def stamp_ns(message_timestamp: Timestamp) -> int:
-    """Read seconds and nanoseconds as integer nanoseconds."""
-    return message_timestamp.seconds * _NS_PER_S + message_timestamp.nanos
+    """Read seconds and nanoseconds as integer nanoseconds.
+
+    Raises:
+        ValueError: they are negative or beyond 2^63 ns.
+    """
+    found = message_timestamp.seconds * _NS_PER_S + message_timestamp.nanos
+    if not 0 <= found < _MAX_STAMP_NS:
+        raise ValueError(f"a message says that its time is {found} ns")
+    return found
 
 
 def image_message(stamp_ns: int, camera: str, png: bytes) -> CompressedImage:

@@ -4,6 +4,7 @@ import hashlib
 import heapq
 import io
 import struct
+import sys
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -22,10 +23,11 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC as MAGIC
 
-from semgrid_eval.errors import LogError
-from semgrid_eval.files import DIGEST_CHARACTERS, digest_files
+from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.files import DIGEST_CHARACTERS, digest_files, open_regular
 
 MAX_CHUNK_BYTES = 1 << 30
+MAX_STAMP_NS = 1 << 63
 _BLOCK_BYTES = 1 << 20
 _HEADER = struct.Struct("<BQ")  # opcode and length of any record
 _FOOTER = struct.Struct("<BQQQI")
@@ -67,8 +69,11 @@ class Container:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        try:
+            self._stream = open_regular(path, limit=sys.maxsize)
+        except InputError as error:
+            raise LogError(str(error).removeprefix(f"{path}: "), path=path) from error
         with damage_as_log_error(path):
-            self._stream = path.open("rb")
             try:
                 self._load()
             except BaseException:
@@ -92,7 +97,7 @@ class Container:
         The bytes themselves are hashed only where the writer left that checksum out.
         """
         if not self._data_crc:
-            return digest_files([self.path])
+            return digest_files([self.path], limit=sys.maxsize)
         return hashlib.sha256(self._tail).hexdigest()[:DIGEST_CHARACTERS]
 
     def messages(self, topics: Iterable[str] | None = None) -> Iterator[Entry]:
@@ -175,6 +180,8 @@ class Container:
         statistics = self.summary.statistics
         if statistics is None or statistics.chunk_count != len(self.summary.chunk_indexes):
             raise McapError("its index is incomplete")
+        if any(index.message_end_time >= MAX_STAMP_NS for index in self.summary.chunk_indexes):
+            raise McapError("it has times of 2^63 ns or more, which are some 292 years")
         self.message_count = statistics.message_count
 
     def _chunk_entries(self, index: records.ChunkIndex, wanted: Mapping[int, str]) -> Iterator[Entry]:

@@ -11,6 +11,7 @@ from semgrid_eval.errors import InputError, LogError, SemgridError
 from semgrid_eval.executors import Executor, InProcess, WorkerDied, local_executor
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import SUFFIX, write_log
+from semgrid_eval.places import remove_stale
 from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.recording.types import Recording
 
@@ -85,6 +86,7 @@ def convert_jobs(
         if count > 1:
             raise InputError("two recordings have this name", field=label_of_job)
     summary = ConversionSummary()
+    remove_stale(out)
     executor = work.executor or local_executor(work.workers)
     with work.stage(label) as progress:
         for done, (index, outcome) in enumerate(executor.run(partial(_convert, out=out), jobs), start=1):

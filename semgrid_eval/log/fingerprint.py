@@ -6,14 +6,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.errors import LogError, ResultError
 from semgrid_eval.executors import Executor, WorkerDied
-from semgrid_eval.files import DIGEST_CHARACTERS, read_json, write_json
+from semgrid_eval.files import DIGEST_CHARACTERS
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.progress import Progress
+from semgrid_eval.seals import read_sealed_json, write_sealed_json
 
 R = TypeVar("R")
 KEPT = "fingerprints.json"
+_OWNER = "fingerprints"
 _MESSAGE = struct.Struct("<qQ")
 
 
@@ -64,7 +66,7 @@ def kept_fingerprints(
                 kept[missing[index]] = outcome
     finally:
         if missing:
-            write_json(cache / KEPT, kept)
+            write_sealed_json(cache / KEPT, kept, _OWNER)
     return {digest: kept[digest] for digest in logs if digest in kept}
 
 
@@ -78,10 +80,9 @@ def _outcomes(
 
 def _kept(path: Path) -> dict[str, str]:
     try:
-        found = read_json(path)
-    except InputError:
+        return read_sealed_json(path, _OWNER)
+    except ResultError:  # not made yet, or damaged
         return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _fingerprint_if_sound(path: Path) -> str | None:

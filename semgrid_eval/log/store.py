@@ -6,7 +6,7 @@ from pathlib import Path
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file
-from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene, conditions_metadata
+from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene, conditions_metadata, require_file_name
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.writer import MessageWriter, MomentWriter
 from semgrid_eval.recording.types import Moment, Recording
@@ -50,6 +50,11 @@ def write_log(recording: Recording, path: Path) -> None:
     """
     same = {name: getattr(recording, name) for name in ("name", "dataset", "split", "source_digest", "group")}
     scene = Scene(**same, cameras=tuple(sorted(recording.calibrations)))
+    try:
+        for what in ("name", "split"):
+            require_file_name(getattr(scene, what), what)
+    except ValueError as error:
+        raise InputError(str(error), field="recording") from error
     with atomic_file(path) as stream, MessageWriter(stream) as writer:
         writer.metadata(RECORD, scene.to_metadata())
         if recording.conditions:

@@ -12,9 +12,10 @@ from semgrid_eval import __version__
 from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError
 from semgrid_eval.log import codec, topics
+from semgrid_eval.log.container import MAX_STAMP_NS
 from semgrid_eval.log.topics import camera_topic
-from semgrid_eval.motion import EgoMotion
-from semgrid_eval.recording.png import read_header, with_palette
+from semgrid_eval.motion import EgoMotion, implausible
+from semgrid_eval.recording.png import PngHeader, read_header, require_pixels, with_palette
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 
 CHUNK_BYTES = 1 << 20
@@ -134,6 +135,8 @@ class MomentWriter:
             raise InputError("holds no frame", field=self._recording.name)
 
     def _advance(self, stamp_ns: int, what: str) -> None:
+        if stamp_ns >= MAX_STAMP_NS:
+            raise InputError(f"{what} at {stamp_ns} ns is beyond 2^63 ns", field=f"{self._recording.name}: stamp_ns")
         if stamp_ns < self._last_ns:
             message = f"{what} at {stamp_ns} ns comes after {self._last_ns} ns"
             raise InputError(message, field=f"{self._recording.name}: stamp_ns")
@@ -142,6 +145,9 @@ class MomentWriter:
     def _motion(self, moment: Moment) -> None:
         for sample in moment.motion:
             self._advance(sample.stamp_ns, "motion sample")
+            if fault := implausible(sample):
+                place = f"{self._recording.name}: motion at {sample.stamp_ns} ns: {fault[0]}"
+                raise InputError(fault[1], field=place)
             self._ego_motion.add(sample)
             self._writer.write(topics.EGO_MOTION, codec.motion_message(sample), log_ns=sample.stamp_ns)
 
@@ -158,7 +164,7 @@ class MomentWriter:
             self._writer.write(topics.TRUE_ACTORS, codec.actors_message(now_ns, moment.actors), log_ns=now_ns)
 
     def _camera(self, camera: str, frame: CameraFrame) -> None:
-        header = read_header(frame.disparity_png)
+        header = self._whole(camera, topics.DISPARITY, frame.disparity_png, frame.stamp_ns)
         calibration = self._recording.calibrations[camera]
         known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, (header.width, header.height))
         self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
@@ -167,6 +173,7 @@ class MomentWriter:
             png: bytes | None = getattr(frame, picture)
             if png is None:
                 continue
+            self._whole(camera, channel, png, frame.stamp_ns)
             if channel in (topics.LABEL, topics.EXACT_LABEL):
                 png = with_palette(png, self._palette)
             if channel == topics.IMAGE:
@@ -174,3 +181,11 @@ class MomentWriter:
             message = codec.image_message(frame.stamp_ns, camera, png)
             self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes)
         self._writer.end_chunk()
+
+    def _whole(self, camera: str, channel: str, png: bytes, stamp_ns: int) -> PngHeader:
+        """Make sure that a picture can be decoded, so that no log holds another."""
+        try:
+            return read_header(png) if self._recording.encoded_here else require_pixels(png)
+        except InputError as error:
+            place = f"{self._recording.name}: {camera_topic(camera, channel)} at {stamp_ns} ns"
+            raise InputError(str(error), field=place) from error

@@ -6,9 +6,12 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
-from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.config import Config, parse_config
+from semgrid_eval.errors import InputError
 from semgrid_eval.windows.data import WindowBatch, WindowSet
+
+_SCORE_TOLERANCE = 1e-3  # of probabilities that do not quite add up to 1
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,11 @@ class Model:
         """
         raise NotImplementedError(f"{type(self).__name__} has no `predict`")
 
+    @property
+    def called(self) -> str:
+        """What errors call it."""
+        return type(self).__name__
+
     @classmethod
     def learns(cls) -> bool:
         """Whether it is fitted to training windows, by counts or by gradient."""
@@ -106,6 +114,41 @@ def one_hot(classes: Tensor) -> Tensor:
     """Turn class ids into certain scores: (B, H, W) uint8 -> (B, C, H, W) float32."""
     ids = torch.arange(CLASS_COUNT, dtype=torch.uint8, device=classes.device)
     return (classes[:, None] == ids[:, None, None]).float()
+
+
+def require_answer(answer: object, batch: WindowBatch, name: str) -> Tensor:
+    """Return an answer to a batch, scores or logits, if it is of the type and shape (B, C, H, W) that is asked for.
+
+    Raises:
+        InputError: it is not; the message begins with the name of its model.
+    """
+    if not isinstance(answer, Tensor):
+        raise InputError(f"gave a {type(answer).__name__} where a tensor is needed", field=name)
+    count, rows, columns = batch.target.shape
+    needed = (count, CLASS_COUNT, rows, columns)
+    if answer.ndim == 4 and answer.shape[1] < CLASS_COUNT and answer.shape[0] == count:
+        missing = ", ".join(CLASS_NAMES[answer.shape[1] :])
+        raise InputError(f"scores {answer.shape[1]} classes, and {missing} are missing", field=name)
+    if answer.shape != needed:
+        raise InputError(f"gave shape {tuple(answer.shape)} where {needed} is needed", field=name)
+    if not answer.is_floating_point():
+        raise InputError(f"gave {answer.dtype} where a floating-point type is needed", field=name)
+    return answer
+
+
+def require_scores(answer: object, batch: WindowBatch, name: str) -> Tensor:
+    """Return an answer if it is scores, all finite and the highest of each cell between 0 and 1, as `predict` says.
+
+    Raises:
+        InputError: it is not; the message begins with the name of its model.
+    """
+    scores = require_answer(answer, batch, name)
+    if not bool(torch.isfinite(scores).all()):
+        raise InputError("gave scores that are NaN or infinite", field=name)
+    low, high = (float(value) for value in torch.aminmax(scores.amax(dim=1)))
+    if not -_SCORE_TOLERANCE <= low <= high <= 1 + _SCORE_TOLERANCE:
+        raise InputError(f"is certain from {low:g} to {high:g}, and scores go from 0 to 1", field=name)
+    return scores
 
 
 def parameter_count(model: Model) -> int | None:

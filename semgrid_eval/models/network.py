@@ -61,7 +61,7 @@ class TrainingConfig(Config):
     epochs: int = Field(default=40, ge=1)
     updates_per_epoch: int = Field(default=185, ge=1)  # batches, or windows with `epoch_unit: windows`
     epoch_unit: Literal["batches", "windows"] = "batches"
-    batch: int = Field(default=32, ge=1)
+    batch: int = Field(default=32, ge=1, le=1 << 16)
     precision: Precision = "auto"  # `auto` takes bfloat16 where the device multiplies in it natively
     clip_norm: float | None = Field(default=None, gt=0)  # limit of the gradient's norm; the paper has none
     optimizer: OptimizerConfig = OptimizerConfig()
@@ -198,7 +198,8 @@ def input_planes(past: Tensor) -> Tensor:
     The planes have the type that layers compute in.
     """
     device = past.device.type
-    dtype = torch.get_autocast_dtype(device) if torch.is_autocast_enabled(device) else torch.float32
+    lower = device != "meta" and torch.is_autocast_enabled(device)  # meta: only shapes are asked for
+    dtype = torch.get_autocast_dtype(device) if lower else torch.float32
     ids = torch.arange(CLASS_COUNT, dtype=torch.uint8, device=past.device)
     planes = past.flatten(1, 2).permute(0, 2, 3, 1).unsqueeze(-1) == ids  # (B, H, W, S * T, C)
     return planes.flatten(3).to(dtype).permute(0, 3, 1, 2)

@@ -8,12 +8,11 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.models.beside import ModelFile
 from semgrid_eval.models.device import is_out_of_memory
-from semgrid_eval.models.model import Given, Model
+from semgrid_eval.models.model import Given, Model, require_answer
 from semgrid_eval.models.network import Network, NetworkSettings
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
@@ -36,10 +35,11 @@ class _Guarded(Model):
 
     def predict(self, batch: WindowBatch) -> Tensor:
         with self._guard():
-            scores = self._checked(super().predict(batch), batch)
-            if not bool(torch.isfinite(scores).all()):
-                raise InputError("gave scores that are NaN or infinite", field=self._own_name)
-            return scores
+            return super().predict(batch)
+
+    @property
+    def called(self) -> str:
+        return self._own_name
 
     @classmethod
     def parse_settings(cls, values: object, *, path: str | None = None) -> Config:
@@ -62,11 +62,6 @@ class _Guarded(Model):
         with one_line(cls._own_name), cls._own_file.present() if cls._own_file else nullcontext():
             yield
 
-    def _checked(self, scores: Tensor, batch: WindowBatch) -> Tensor:
-        if fault := _fault(scores, batch):
-            raise InputError(fault, field=self._own_name)
-        return scores
-
 
 class _GuardedNetwork(_Guarded, Network):
     """Stands before a network of one's own, also while it is trained."""
@@ -76,7 +71,7 @@ class _GuardedNetwork(_Guarded, Network):
         own = replace(batch, shift_cells=batch.shift_cells.clone(), lead_s=batch.lead_s.clone())
         with self._guard():
             # What is no number ends a training by its loss, which says more.
-            return self._checked(super().forward(own), batch)
+            return require_answer(super().forward(own), batch, self._own_name)
 
     def loss(self, logits: Tensor, batch: WindowBatch) -> Tensor:
         with self._guard():
@@ -111,21 +106,9 @@ def one_line(name: str) -> Iterator[None]:
     """Turn whatever code of one's own raises into one line, but for a lack of memory, which is not its fault."""
     try:
         yield
-    except SemgridError:
+    except (SemgridError, KeyboardInterrupt):
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         if is_out_of_memory(error):
             raise
         raise InputError(f"raised {type(error).__name__}: {error}", field=name) from error
-
-
-def _fault(scores: object, batch: WindowBatch) -> str | None:
-    """Say in one line what is wrong with an answer's type or shape, None where nothing is."""
-    if not isinstance(scores, Tensor):
-        return f"gave a {type(scores).__name__} where a tensor is needed"
-    count, rows, columns = batch.target.shape
-    if scores.ndim == 4 and scores.shape[1] < CLASS_COUNT and scores.shape[0] == count:
-        return f"scores {scores.shape[1]} classes, and {', '.join(CLASS_NAMES[scores.shape[1] :])} are missing"
-    if scores.shape != (count, CLASS_COUNT, rows, columns):
-        return f"gave shape {tuple(scores.shape)} where {(count, CLASS_COUNT, rows, columns)} is needed"
-    return None if scores.is_floating_point() else f"gave {scores.dtype} where a floating-point type is needed"

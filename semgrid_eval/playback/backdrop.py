@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from google.protobuf.message import Message
 
-from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.errors import InputError, LogError, printable
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.reader import LogReader
@@ -103,7 +103,9 @@ def viewer_layout(row: RowRecord, cameras: Sequence[str]) -> dict[str, Any]:
     """Fill the template for a row and the first of the cameras; without a camera, the panels of pictures go."""
     text = resources.files("semgrid_eval").joinpath(_TEMPLATE).read_text(encoding="utf-8")
     text = text.replace("{prediction}", prediction_topic(row.name))
-    text = text.replace("{camera}", cameras[0] if cameras else "").replace("{row}", json.dumps(row.name)[1:-1])
+    text = text.replace("{camera}", cameras[0] if cameras else "").replace(
+        "{row}", json.dumps(printable(row.name))[1:-1]
+    )
     layout: dict[str, Any] = json.loads(text)
     shown = layout["configById"]["3D!input"]["topics"]
     settings = shown.pop(f"{GRID_INPUT}/{{sensor}}")

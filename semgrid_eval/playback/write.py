@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import InputError, LogError, ResultError
-from semgrid_eval.files import atomic_file, write_json
+from semgrid_eval.files import atomic_file, write_text
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import topics
 from semgrid_eval.log.codec import transforms_message
@@ -21,11 +21,11 @@ from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, GridPlac
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.playback.backdrop import Backdrop, Outgoing, prediction_topic, viewer_layout
+from semgrid_eval.playback.place import LAYOUT, RECORD, digest_of, require_place
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.scores import results
 
-RECORD = "semgrid.playback"
 GAP_NS = 1_000_000_000
 """Between recordings that are played one after the other: those of one town may overlap in time."""
 
@@ -49,6 +49,7 @@ def write_playback(
     logs: Path | None = None,
     recording: str | None = None,
     every_recording: bool = False,
+    force: bool = False,
     progress: Progress = silent,
 ) -> Playback:
     """Write the windows of a row as an MCAP log, and a layout for Foxglove and Lichtblick beside it.
@@ -62,36 +63,47 @@ def write_playback(
         logs: folder of the run's logs; with it come pictures, calibration and the vehicle's way.
         recording: the one to play; the first if not given.
         every_recording: play all of them one after the other, later ones shifted in time.
+        force: replace `out` and the layout beside it, whatever they are; else only an earlier log of this kind.
         progress: told of each recording.
 
     Raises:
-        InputError: row, recording or predictions do not exist, or a log is missing or not the one that was scored.
+        InputError: row, recording or predictions do not exist, a log is missing or not the one that was scored, or
+            `out` may not be written.
     """
     if logs is not None and out.resolve().is_relative_to(logs.resolve()):
         raise InputError("lies in the folder of logs, where it would be taken for one", path=out)
     record = results.read_run(run)
     scored = _read_scored(run, _row(record, row_name, run))
     chosen = _choose(scored, recording, every_recording=every_recording)
+    layout, text = out.with_suffix(".layout.json"), _layout_text(record, scored, chosen[-1], logs)
+    require_place(out, layout, text, (log.path for log in record.logs), force=force)
     shifts_ns: dict[str, int] = {}  # what was added to each recording's times
-    cameras: tuple[str, ...] = ()
     with atomic_file(out) as stream, MessageWriter(stream) as writer:
         end_ns = None
         for done, name in enumerate(chosen, start=1):
             with ExitStack() as stack:
-                backdrop = _open_backdrop(record, scored, name, logs, stack) if logs is not None else None
+                log = _open_log(record, scored, name, logs, stack) if logs is not None else None
+                backdrop = Backdrop(log, scored.grid) if log is not None else None
                 played = _Messages(scored, name, backdrop)
                 shift_ns = 0 if end_ns is None else end_ns + GAP_NS - played.first_ns
                 for sent in played.messages(shift_ns):
                     writer.write(**sent._asdict())
-                cameras = cameras if backdrop is None else backdrop.cameras
             shifts_ns[name], end_ns = shift_ns, played.last_ns + shift_ns
             progress(done, len(chosen), name)
-        made = {"run": record.title, "row": row_name, "result": scored.record.id}
+        made = {"run": record.title, "row": row_name, "result": scored.record.id, LAYOUT: digest_of(text.encode())}
         dumped = {"seed": json.dumps(scored.record.seed), "shift_ns": json.dumps(shifts_ns)}
         writer.metadata(RECORD, made | dumped)
-    layout = out.with_suffix(".layout.json")
-    write_json(layout, viewer_layout(scored.row, cameras))
+        write_text(layout, text)
     return Playback(out, layout, tuple(chosen))
+
+
+def _layout_text(record: results.RunRecord, scored: "_Scored", name: str, logs: Path | None) -> str:
+    """Write the layout for what a recording's log shows."""
+    cameras: tuple[str, ...] = ()
+    if logs is not None:
+        with ExitStack() as stack:
+            cameras = _open_log(record, scored, name, logs, stack).scene.cameras
+    return json.dumps(viewer_layout(scored.row, cameras), indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
 @dataclass(frozen=True)
@@ -155,7 +167,7 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:_LISTED_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
-def _open_backdrop(record: results.RunRecord, scored: _Scored, name: str, logs: Path, stack: ExitStack) -> Backdrop:
+def _open_log(record: results.RunRecord, scored: _Scored, name: str, logs: Path, stack: ExitStack) -> LogReader:
     if not logs.is_dir():
         raise InputError("is not a folder", path=logs)
     path = scored.record.windows[scored.windows_of[name][0]].log
@@ -163,7 +175,7 @@ def _open_backdrop(record: results.RunRecord, scored: _Scored, name: str, logs: 
     known = results.scored_digest(record, scored.record, path)
     if log.digest not in (scored.record.log_digests if known is None else (known,)):
         raise LogError(f"has digest {log.digest}, and the log that was scored had {known or 'another'}", path=log.path)
-    return Backdrop(log, scored.grid)
+    return log
 
 
 class _Messages:

@@ -7,6 +7,7 @@ import io
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,6 +23,11 @@ GRAY, PALETTE = 0, 3
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _HEADER = struct.Struct(">IIBBBBB")
 _CHUNK_OVERHEAD_BYTES = 12  # length, type and CRC
+_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by colour type
+_DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
+_LAST_FILTER = 4
+# Of interlaced pictures: first column and row of each pass, and the steps between columns and rows.
+_ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
 _COLOUR_TYPES = {0: "gray", 2: "colour", 3: "palette", 4: "gray with alpha", 6: "colour with alpha"}
 _DECODER_ERRORS = (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, Image.DecompressionBombError)
 
@@ -59,6 +65,51 @@ def read_header(data: bytes, path: Path | None = None) -> PngHeader:
     if not 0 < header.width * header.height <= MAX_PIXELS:
         raise InputError(f"is {header}; 1 to {MAX_PIXELS} pixels are allowed", path=path)
     return header
+
+
+def require_pixels(data: bytes, path: Path | None = None) -> PngHeader:
+    """Read the header of a PNG file, and make sure that all its pixels are there, as `read_header` does for the file.
+
+    The compressed pixels have a checksum of their own, which decoders do not look at.
+    """
+    header = read_header(data, path)
+    fault = _fault_of_pixels(data)
+    if fault:
+        raise InputError(f"is a damaged PNG file: {fault}", path=path)
+    return header
+
+
+@lru_cache(maxsize=8)  # who finds a file looks at it, and again who writes it to a log
+def _fault_of_pixels(data: bytes) -> str:
+    """Say what is wrong with the pixels of a file whose header and chunks are sound; empty where nothing is."""
+    chunks = list(_chunks(data, None))
+    width, height, depth, colour, *methods, interlace = _HEADER.unpack_from(data, chunks[0].start + 8)
+    if depth not in _DEPTHS.get(colour, ()) or any(methods) or interlace > 1:
+        return "its header is impossible"
+    bits = depth * _CHANNELS[colour]
+    passes = _ADAM7 if interlace else ((0, 0, 1, 1),)
+    sizes = [(-(-(width - x) // across), -(-(height - y) // down)) for x, y, across, down in passes]
+    lines = [(1 + (columns * bits + 7) // 8, rows) for columns, rows in sizes if columns > 0 < rows]
+    total = sum(length * rows for length, rows in lines)
+    stream = zlib.decompressobj()
+    try:
+        packed = b"".join(data[chunk.start + 8 : chunk.end - 4] for chunk in chunks if chunk.kind == b"IDAT")
+        pixels = stream.decompress(packed, total)
+        more = stream.decompress(stream.unconsumed_tail, 1)
+    except zlib.error as error:
+        return str(error)
+    if len(pixels) != total or more or not stream.eof:
+        return "it has too few pixels" if len(pixels) < total else "its pixels do not end where they should"
+    return "" if _filters(pixels, lines) <= _LAST_FILTER else "a line of pixels begins wrongly"
+
+
+def _filters(pixels: bytes, lines: Sequence[tuple[int, int]]) -> int:
+    """Return the highest number of a filter, with which each line begins; of each length there are so many lines."""
+    highest, start = 0, 0
+    for length, rows in lines:
+        highest = max(highest, *pixels[start : start + length * rows : length])
+        start += length * rows
+    return highest
 
 
 def decode_gray(data: bytes, *, bit_depth: int, path: Path | None = None) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -116,3 +116,4 @@ class Recording:
     source_files: dict[str, bytes] = field(default_factory=dict)  # by attachment name (`front_camera.json`)
     conditions: dict[str, Quantity] = field(default_factory=dict)  # what sets it apart from others of its data set
     group: str = ""  # the town, city or drive that it belongs to, with other recordings that may depend on it
+    encoded_here: bool = False  # whether this package encodes its pictures itself: others are decoded before they count

@@ -125,6 +125,7 @@ class RunData:
                     split=recording.split,
                     dataset=recording.dataset,
                     group=recording.group,
+                    checksums=recording.has_checksums,
                 )
         return self._sets[key]
 

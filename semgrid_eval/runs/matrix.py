@@ -15,13 +15,14 @@ from semgrid_eval.models.registry import is_named
 from semgrid_eval.runs.row import Row
 
 ROW_LIMIT = 10_000
+MAX_SEED = 1 << 53  # whoever reads JSON has whole numbers up to here
 
 
 class Matrix(Config):
     """A resolved matrix: every row complete."""
 
     title: str
-    seed: int = Field(ge=0)
+    seed: int = Field(ge=0, le=MAX_SEED)
     rows: tuple[Row, ...] = Field(min_length=1)
 
 
@@ -39,7 +40,7 @@ class _MatrixFile(Config):
     extends: str | None = None
     without: list[str] = Field(default_factory=list)  # written names of the base's rows to leave out
     title: str = Field("", max_length=200)  # the name of the file if not given, also where it extends another
-    seed: int | None = Field(None, ge=0)
+    seed: int | None = Field(None, ge=0, le=MAX_SEED)
     models: dict[str, dict[str, Any]] = Field(default_factory=dict)  # settings by model, under those of its rows
     defaults: dict[str, Any] = Field(default_factory=dict)
     rows: list[dict[str, Any]] = Field(default_factory=list)

@@ -10,6 +10,7 @@ import torch
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.checkpoint import HISTORY_FILE, read_history
+from semgrid_eval.models.memory import require_room
 from semgrid_eval.models.network import Network, NetworkSettings, ScheduleConfig, TrainingConfig, seeded_network
 from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage, silent_stage
@@ -118,6 +119,7 @@ class _Speed:
     def _measure(self, job: Job, sample: NetworkSettings) -> float:
         assert job.training is not None
         assert issubclass(job.resolved.model, Network)
+        require_room(job.resolved.model, sample, job.row.given, self._worker.device)
         network = seeded_network(job.resolved.model, sample, job.row.given, seed=0)
         threads = torch.get_num_threads()
         torch.set_num_threads(self._worker.threads)

@@ -1,6 +1,6 @@
 """Runs a matrix: tries its units here or wherever an executor sends them, and keeps the record as it goes."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -14,6 +14,7 @@ from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.device import choose_device, is_out_of_memory, settle_process
 from semgrid_eval.models.registry import MODELS
+from semgrid_eval.places import remove_stale
 from semgrid_eval.progress import Progress, Stage, silent, silent_stage
 from semgrid_eval.runs.data import GridSource, RunData
 from semgrid_eval.runs.matrix import Matrix
@@ -58,9 +59,7 @@ def run_matrix(
     rows = wanted_rows(matrix, options.only)
     units, wanted = plan_units(matrix.rows, matrix.seed), plan_units(rows, matrix.seed)
     worker = make_worker(matrix, logs, out, options, stage)
-    for data in worker.data:
-        data.prepare()
-        data.identify()
+    _prepare(worker)
     outcomes: dict[str, Outcome] = {}
 
     def look_for_others() -> None:
@@ -85,7 +84,24 @@ def run_matrix(
             keep_record()
             progress(done, len(keys))
     look_for_others()  # another run may have worked on the same folder
+    outcomes.update(_lost(out, outcomes))
     return keep_record()
+
+
+def _prepare(worker: Worker) -> None:
+    """Remove what runs that were killed have left half-written, and build all grids."""
+    for folder in (worker.out, worker.trainings):
+        remove_stale(folder)
+    for data in worker.data:
+        data.prepare()
+        data.identify()
+
+
+def _lost(out: Path, outcomes: Mapping[str, Outcome]) -> dict[str, Outcome]:
+    """Find the units whose results somebody has removed meanwhile."""
+    there = {key: found.result_id for key, found in outcomes.items() if found.result_id is not None}
+    lost = Outcome(None, "its result was removed while the run went on; the same command makes it again", {})
+    return {key: lost for key, found in there.items() if not results.result_folder(out, found).is_dir()}
 
 
 def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:

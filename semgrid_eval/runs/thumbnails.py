@@ -1,6 +1,7 @@
 """Keeps small pictures of the frames that a run's windows use, and the track; what a log cannot give is left out."""
 
-from collections.abc import Iterable, Mapping
+import logging
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -31,6 +32,8 @@ from semgrid_eval.sensors.projection import nearest_indices, unit_projection
 if TYPE_CHECKING:  # processes that only shrink pictures need no torch
     from semgrid_eval.windows.data import WindowSet
 
+_log = logging.getLogger(__name__)
+_NO_TRACK = Track(0, np.empty(0, np.int64), np.empty((0, 3)), np.empty((3, 4)))
 WIDTH_PX = 256
 WEBP_QUALITY = 75
 
@@ -56,7 +59,8 @@ def keep_pictures(
     Raises:
         InputError: the folder cannot be written to.
     """
-    missing = [request for request in _requests(run, windows) if not request.stamps_ns <= _kept(request.file).keys()]
+    found = _requests(run, windows)
+    missing = [each for each in found if not each.stamps_ns <= _kept(each.file, tell=True).frames.keys()]
     if not missing:
         return
     with stage("pictures") as progress:
@@ -72,7 +76,7 @@ def log_pictures(log: Path, digest: str, grid: GridConfig, stamps_ns: Iterable[i
     Raises:
         LogError: the log cannot be read, is damaged, or has another digest, or no camera leads the target.
     """
-    wanted = set(stamps_ns)
+    wanted, faults = set(stamps_ns), list[str]()
     found: dict[int, dict[str, bytes]] = {stamp: {} for stamp in wanted}
     with LogReader(log) as reader:
         if reader.digest != digest:
@@ -85,27 +89,25 @@ def log_pictures(log: Path, digest: str, grid: GridConfig, stamps_ns: Iterable[i
             if stamp_ns > max(wanted, default=-1):
                 break
             if stamp_ns in wanted:
-                found[stamp_ns][channel] = _SHRINK[channel](png)
-    return LogPictures(track, {stamp: FramePictures(**files) for stamp, files in found.items()})
+                try:
+                    found[stamp_ns][channel] = _SHRINK[channel](png)
+                except InputError as error:
+                    faults.append(f"{log.stem}: {channel} at {stamp_ns} ns {error}")
+    frames = {stamp: FramePictures(**files) for stamp, files in found.items()}
+    return LogPictures(track, frames, tuple(faults))
 
 
 def small_image(png: bytes) -> bytes:
-    """Turn a colour image, a PNG file, into a small WebP file; empty where it cannot be decoded."""
-    try:
-        image = decode_colour(png)
-    except InputError:
-        return b""
+    """Turn a colour image, a PNG file, into a small WebP file; an InputError says that it cannot be decoded."""
+    image = decode_colour(png)
     small = cv2.resize(image, _small_size(*image.shape[:2])[::-1], interpolation=cv2.INTER_AREA)
     _, data = cv2.imencode(".webp", small[..., ::-1], [cv2.IMWRITE_WEBP_QUALITY, WEBP_QUALITY])
     return bytes(data)
 
 
 def small_label(png: bytes) -> bytes:
-    """Turn a label image, a PNG file of label ids, into a small one with their colours; empty as `small_image`."""
-    try:
-        ids = decode_ids(png)
-    except InputError:
-        return b""
+    """Turn a label image, a PNG file of label ids, into a small one with their colours; errors as `small_image`."""
+    ids = decode_ids(png)
     height, width = _small_size(*ids.shape)
     small = ids[nearest_indices(ids.shape[0], height)[:, None], nearest_indices(ids.shape[1], width)[None, :]]
     return with_palette(encode_gray(small), label_palette()[: int(small.max()) + 1])
@@ -154,18 +156,22 @@ def _keep(request: Request) -> InputError | None:
     """Add what is missing to a log's pictures, or return why that cannot be written."""
     kept = _kept(request.file)
     try:
-        made = log_pictures(request.log, request.digest, request.grid, request.stamps_ns - kept.keys())
-    except SemgridError:
+        made = log_pictures(request.log, request.digest, request.grid, request.stamps_ns - kept.frames.keys())
+    except SemgridError as error:
+        _log.warning("%s; there are no pictures of it", error)
         return None
     try:
-        write_pictures(request.file, LogPictures(made.track, {**kept, **made.frames}))
+        both = LogPictures(made.track, {**kept.frames, **made.frames}, kept.faults + made.faults)
+        write_pictures(request.file, both)
     except InputError as error:
         return error
     return None
 
 
-def _kept(file: Path) -> Mapping[int, FramePictures]:
+def _kept(file: Path, *, tell: bool = False) -> LogPictures:
     try:
-        return read_pictures(file).frames
-    except ResultError:  # not made yet, or damaged
-        return {}
+        return read_pictures(file)
+    except ResultError as error:  # not made yet, or damaged
+        if tell and file.exists():
+            _log.warning("%s; the pictures are made again", error)
+        return LogPictures(_NO_TRACK)

@@ -1,6 +1,6 @@
 """Works on units of a run: one row with one seed, fitted if need be, scored, and kept under the digest of all of it."""
 
-import shutil
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -14,7 +14,9 @@ from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import atomic_folder, digest_value
 from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
+from semgrid_eval.models.checkpoint import read_history, write_history
 from semgrid_eval.models.device import choose_precision, seeded
+from semgrid_eval.models.memory import require_room
 from semgrid_eval.models.model import Model, parameter_count
 from semgrid_eval.models.network import Network, NetworkSettings, seeded_network
 from semgrid_eval.models.registry import find_model, version_of
@@ -35,6 +37,7 @@ from semgrid_eval.windows.data import (
     window_arrays,
 )
 
+_log = logging.getLogger(__name__)
 WindowPlanner = Callable[[Sequence[int], WindowConfig, Sequence[int]], WindowPlan]
 
 
@@ -112,22 +115,33 @@ class Worker:
         """Make sure that the result of a row with one seed lies in the run's folder, and return what was resolved."""
         job = self.look(row, seed)
         self._keep_windows(job.scored, job.windows_id)
-        if job.resolved.is_known and self.is_done(job):
+        folder = results.result_folder(self.out, job.result_id)
+        if job.resolved.is_known and not self._is_to_be_made(job, folder):
             return job
         with seeded(seed or 0, self.device):
             model, train_seconds = self._fitted(job)
             with self.stage(f"score {row.name}") as progress:
                 evaluation = evaluate(model, job.scored, mask_mode=row.mask_mode, spec=row.grid.spec, progress=progress)
+        self._keep_windows(job.scored, job.windows_id)  # code of one's own may have removed them
         record = self._result_record(job, model, train_seconds, evaluation.seconds)
-        folder = results.result_folder(self.out, job.result_id)
         _keep_result(folder, record, evaluation, self._history(job), with_predictions=self._shows(seed))
         return job
 
     def is_done(self, job: Job) -> bool:
         """Tell whether all that a job leaves lies in the run's folder."""
+        return self._fault(job) is None
+
+    def _is_to_be_made(self, job: Job, folder: Path) -> bool:
+        """Tell whether a result is not done, and say so where there is something in its place."""
+        fault = self._fault(job)
+        if fault is not None and folder.exists():
+            _log.warning("%s; the result is made again", fault)
+        return fault is not None
+
+    def _fault(self, job: Job) -> str | None:
         folder = results.result_folder(self.out, job.result_id)
         with_history = self._history(job) is not None
-        return results.is_done(folder, with_predictions=self._shows(job.seed), with_history=with_history)
+        return results.fault_of(folder, with_predictions=self._shows(job.seed), with_history=with_history)
 
     def _shows(self, seed: int | None) -> bool:
         return seed in (None, self.example_seed)
@@ -190,6 +204,7 @@ class Worker:
         """Return the job's model, ready to predict, and how many seconds gradients have trained it."""
         made, settings, training, seed = job.resolved.model, job.resolved.settings, job.training, job.seed or 0
         if training and issubclass(made, Network):
+            require_room(made, settings, job.row.given, self.device)
             network = seeded_network(made, settings, job.row.given, seed)
             train_it = partial(train, network, training.windows, seed=seed, device=self.device, folder=training.folder)
             with self.stage(f"train {job.row.name} (seed {seed})") as progress:
@@ -224,12 +239,15 @@ class Worker:
         )
 
     def _keep_windows(self, windows: WindowSet, windows_id: str) -> None:
-        if windows_id in self._kept:
+        file = results.windows_file(self.out, windows_id)
+        if windows_id in self._kept and file.exists():
             return
         try:
             results.read_windows(self.out, windows_id)
-        except ResultError:  # not there yet, or damaged
-            write_arrays(results.windows_file(self.out, windows_id), window_arrays(windows))
+        except ResultError as error:  # not there yet, or damaged
+            if file.exists():
+                _log.warning("%s; the windows are kept again", error)
+            write_arrays(file, window_arrays(windows), owner=windows_id)
         self._kept.add(windows_id)
 
 
@@ -237,10 +255,10 @@ def _keep_result(
     folder: Path, record: results.ResultRecord, evaluation: Evaluation, history: Path | None, *, with_predictions: bool
 ) -> None:
     with atomic_folder(folder) as partial:
-        results.write_sums(partial, evaluation.sums)
+        results.write_sums(partial, evaluation.sums, record.id)
         if with_predictions:
             arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
-            write_arrays(partial / results.PREDICTIONS_FILE, arrays)
+            write_arrays(partial / results.PREDICTIONS_FILE, arrays, owner=record.id)
         if history:
-            shutil.copyfile(history, partial / results.HISTORY_FILE)
+            write_history(partial / results.HISTORY_FILE, read_history(history), owner=record.id)
         results.write_result(partial, record)

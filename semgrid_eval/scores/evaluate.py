@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.errors import InputError
 from semgrid_eval.grids.spec import GridSpec
-from semgrid_eval.models.model import Model
+from semgrid_eval.models.model import Model, require_answer, require_scores
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores.metrics.metric import ScoredWindows
 from semgrid_eval.scores.metrics.table import Sums, count_windows
@@ -92,9 +92,11 @@ def _predict(model: Model, seen: WindowBatch) -> Evaluation:
         torch.cuda.synchronize(seen.target.device)
     start_s = time.perf_counter()
     with torch.inference_mode():
-        certainty, prediction = model.predict(_without_answer(seen)).max(dim=1)
+        scores = require_answer(model.predict(_without_answer(seen)), seen, model.called)
+        certainty, prediction = scores.max(dim=1)
         answer = prediction.to(torch.uint8).cpu().numpy()
     seconds = time.perf_counter() - start_s
+    require_scores(scores, seen, model.called)
     levels = (certainty.float().clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy()
     return Evaluation({}, answer, levels, seconds)
 

@@ -16,6 +16,7 @@ RUN/pictures/<key>.npz         small camera and label images of the windows' fra
 ```
 """
 
+import io
 import re
 from collections.abc import Sequence
 from itertools import product
@@ -28,16 +29,17 @@ from numpy.typing import NDArray
 
 from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.config import Config, parse_config
-from semgrid_eval.errors import InputError, ResultError
-from semgrid_eval.files import read_json, write_json
+from semgrid_eval.errors import InputError, ResultError, first_line
 from semgrid_eval.scores.metrics.table import METRICS, Sums
 from semgrid_eval.scores.regions.table import PARTITIONS
+from semgrid_eval.seals import read_sealed, read_sealed_json, write_sealed_json
 
 FORMAT_VERSION = 2
 RUN_FILE, RESULT_FILE = "run.json", "result.json"
 SUMS_FILE = "sums.npz"
 PREDICTIONS_FILE = "predictions.npz"
 HISTORY_FILE = "history.csv"
+_RUN = "run"  # owns the record of a run, which has no id
 NOT_RUN = "not run yet"
 """What the record of a row says whose turn has not come."""
 
@@ -51,6 +53,7 @@ class LogRecord(Config):
     split: str
     dataset: str
     group: str = ""  # the town, city or drive that it belongs to; empty where it stands for itself
+    checksums: bool = True  # whether it has them; without, damage cannot be seen
     fingerprint: str | None = None  # of a benchmark's log: what is compared with the published ones
 
 
@@ -157,38 +160,45 @@ def scored_digest(run: RunRecord, result: ResultRecord, path: str) -> str | None
 
 def write_run(run: Path, record: RunRecord) -> None:
     """Write a run's record atomically."""
-    write_json(run / RUN_FILE, record.model_dump(mode="json"))
+    write_sealed_json(run / RUN_FILE, record.model_dump(mode="json"), _RUN)
 
 
 def read_run(run: Path) -> RunRecord:
     """Read a run's record; an InputError says that it is missing, malformed or of another format version."""
     if not (run / RUN_FILE).is_file():
         raise ResultError("is not the folder of a run: it has no run.json", path=run)
-    return _record(RunRecord, run / RUN_FILE)
+    return _record(RunRecord, run / RUN_FILE, _RUN)
 
 
 def write_result(folder: Path, record: ResultRecord) -> None:
     """Write a result's record."""
-    write_json(folder / RESULT_FILE, record.model_dump(mode="json"))
+    write_sealed_json(folder / RESULT_FILE, record.model_dump(mode="json"), record.id)
 
 
 def read_result(folder: Path) -> ResultRecord:
     """Read a result's record; an InputError says that it is missing, malformed, or of another version or folder."""
-    record = _record(ResultRecord, folder / RESULT_FILE)
+    record = _record(ResultRecord, folder / RESULT_FILE, folder.name)
     if record.id != folder.name:
         raise ResultError(f"belongs to another folder than {folder.name}", path=folder / RESULT_FILE, field="id")
     return record
 
 
-def is_done(folder: Path, *, with_predictions: bool = False, with_history: bool = False) -> bool:
-    """Tell whether a result parses, matches its id, has sums of every metric, and what else is asked for."""
+def fault_of(folder: Path, *, with_predictions: bool = False, with_history: bool = False) -> str | None:
+    """Say why a result is not done; None where it parses, matches its id and has sums and what else is asked for."""
     try:
         check_sums(folder, len(read_result(folder).windows))
         if with_predictions:
             read_predictions(folder)
-        return not with_history or ((history := read_history(folder)) is not None and not history.empty)
-    except (InputError, OSError, ValueError):
-        return False
+        if with_history and ((history := read_history(folder)) is None or history.empty):
+            raise ResultError("is missing or empty", path=folder / HISTORY_FILE)
+    except (InputError, OSError, ValueError) as error:
+        return first_line(error)
+    return None
+
+
+def is_done(folder: Path, *, with_predictions: bool = False, with_history: bool = False) -> bool:
+    """Tell whether a result is done."""
+    return fault_of(folder, with_predictions=with_predictions, with_history=with_history) is None
 
 
 def read_windows(run: Path, windows_id: str) -> dict[str, NDArray[Any]]:
@@ -197,28 +207,34 @@ def read_windows(run: Path, windows_id: str) -> dict[str, NDArray[Any]]:
     Raises:
         ResultError: they are missing or damaged; likewise below.
     """
-    return read_arrays(windows_file(run, windows_id), ("inputs", "target", "mask"))
+    return read_arrays(windows_file(run, windows_id), ("inputs", "target", "mask"), owner=windows_id)
 
 
 def read_predictions(folder: Path) -> dict[str, NDArray[Any]]:
     """Read what a result predicted: `prediction` and `certainty`."""
-    return read_arrays(folder / PREDICTIONS_FILE, ("prediction", "certainty"))
+    return read_arrays(folder / PREDICTIONS_FILE, ("prediction", "certainty"), owner=folder.name)
 
 
 def read_history(folder: Path) -> pd.DataFrame | None:
     """Read the training history of a result, None where nothing was trained."""
     path = folder / HISTORY_FILE
-    return pd.read_csv(path) if path.is_file() else None
+    if not path.is_file():
+        return None
+    return pd.read_csv(io.BytesIO(read_sealed(path, folder.name)), comment="#")
 
 
-def write_sums(folder: Path, sums: Sums) -> None:
-    """Write what every metric counted in a result's windows."""
-    write_arrays(folder / SUMS_FILE, {".".join(key): array for key, array in sums.items()})
+def write_sums(folder: Path, sums: Sums, result_id: str = "") -> None:
+    """Write what every metric counted in a result's windows; the folder has its id as a name, if not given."""
+    arrays = {".".join(key): array for key, array in sums.items()}
+    write_arrays(folder / SUMS_FILE, arrays, owner=result_id or folder.name)
 
 
-def read_sums(folder: Path, metric: str, partition: str) -> NDArray[np.int32] | None:
-    """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions."""
-    return _read_sums(folder, [(metric, partition)]).get((metric, partition))
+def read_sums(folder: Path, metric: str, partition: str, *, verify: bool = True) -> NDArray[np.int32] | None:
+    """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions.
+
+    Who has called `check_sums` before need not `verify` the file each time.
+    """
+    return _read_sums(folder, [(metric, partition)], verify=verify).get((metric, partition))
 
 
 def check_sums(folder: Path, windows: int) -> None:
@@ -229,10 +245,13 @@ def check_sums(folder: Path, windows: int) -> None:
             raise ResultError(fault, path=folder / SUMS_FILE, field=".".join(key))
 
 
-def _read_sums(folder: Path, keys: Sequence[tuple[str, str]]) -> dict[tuple[str, str], NDArray[np.int32]]:
+def _read_sums(
+    folder: Path, keys: Sequence[tuple[str, str]], *, verify: bool = True
+) -> dict[tuple[str, str], NDArray[np.int32]]:
     path, names = folder / SUMS_FILE, {key: ".".join(key) for key in keys}
     needed = tuple(name for key, name in names.items() if key[1] == "all")
-    found = read_arrays(path, needed, optional=tuple(name for name in names.values() if name not in needed))
+    optional = tuple(name for name in names.values() if name not in needed)
+    found = read_arrays(path, needed, owner=folder.name, optional=optional, verify=verify)
     sums = {key: found[name] for key, name in names.items() if name in found}
     for (metric, partition), counted in sums.items():
         shape = (len(PARTITIONS[partition].regions), *METRICS[metric].shape)
@@ -242,8 +261,8 @@ def _read_sums(folder: Path, keys: Sequence[tuple[str, str]]) -> dict[tuple[str,
     return sums
 
 
-def _record(kind: type[R], path: Path) -> R:
-    record = parse_config(kind, read_json(path), path=path)
+def _record(kind: type[R], path: Path, owner: str) -> R:
+    record = parse_config(kind, read_sealed_json(path, owner), path=path)
     if record.format_version != FORMAT_VERSION:
         fault = f"{record.format_version} is not {FORMAT_VERSION}, which this version reads"
         raise ResultError(fault, path=path, field="format_version")

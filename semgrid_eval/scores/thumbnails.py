@@ -5,6 +5,7 @@
 - `stamps_ns` (K,) int64, ascending; the files of all images, then of all labels, one after the other as `images` and
   `labels` uint8, and where each ends as `image_ends` and `label_ends` (K,) int64. An empty file stands for a picture
   that the log does not have.
+- `faults` (M,) words: what is wrong with pictures of the log, one line each.
 - `start_ns` (1,) int64, when the log begins; `track_ns` (F,) int64, times of all frames, `track` (F, 3) float64, poses
   of the vehicle there, and `projection` (3, 4) float64, as `Track` says.
 """
@@ -24,8 +25,10 @@ from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
 
 FORMAT_VERSION = 2
+PICTURES = "pictures"
 _FILES = ("images", "image_ends", "labels", "label_ends")
 _TRACK = ("start_ns", "track_ns", "track", "projection")
+_ALL = ("stamps_ns", *_FILES, *_TRACK, "faults")
 
 
 @dataclass(frozen=True)
@@ -52,17 +55,18 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class LogPictures:
-    """What is kept of a log: the track, and pictures of frames by their stamps (ns)."""
+    """What is kept of a log: the track, pictures of frames by their stamps (ns), and what is wrong with the log's."""
 
     track: Track
     frames: Mapping[int, FramePictures] = field(default_factory=dict)
+    faults: tuple[str, ...] = ()
 
 
 def pictures_file(run: Path, log_digest: str, grid: GridConfig) -> Path:
     """Return where the pictures lie of the camera that leads the target of a log's grids."""
     camera = grid.camera.camera if grid.camera else None
     key = {"log": log_digest, "camera": camera, "integrator": grid.integrator, "format": FORMAT_VERSION}
-    return run / "pictures" / f"{digest_value(key)}.npz"
+    return run / PICTURES / f"{digest_value(key)}.npz"
 
 
 def write_pictures(path: Path, kept: LogPictures) -> None:
@@ -71,25 +75,38 @@ def write_pictures(path: Path, kept: LogPictures) -> None:
     images, image_ends = _joined([kept.frames[stamp].image for stamp in stamps_ns])
     labels, label_ends = _joined([kept.frames[stamp].label for stamp in stamps_ns])
     track = (np.array([kept.track.start_ns]), kept.track.stamps_ns, kept.track.poses, kept.track.projection)
-    values = (np.array(stamps_ns, np.int64), images, image_ends, labels, label_ends, *track)
-    write_arrays(path, dict(zip(("stamps_ns", *_FILES, *_TRACK), values, strict=True)))
+    faults = np.array(kept.faults, np.str_)
+    values = (np.array(stamps_ns, np.int64), images, image_ends, labels, label_ends, *track, faults)
+    write_arrays(path, dict(zip(_ALL, values, strict=True)), owner=path.stem)
 
 
 def read_pictures(path: Path) -> LogPictures:
     """Read what is kept of a log; a ResultError says that it is missing or malformed."""
-    arrays = read_arrays(path, ("stamps_ns", *_FILES, *_TRACK))
+    arrays = read_arrays(path, _ALL, owner=path.stem)
     stamps_ns = _checked(arrays, "stamps_ns", (-1,), np.int64, path).tolist()
     images = _cut(arrays, "images", "image_ends", path)
     labels = _cut(arrays, "labels", "label_ends", path)
     if not len(stamps_ns) == len(images) == len(labels):
         raise ResultError(f"{len(stamps_ns)} frames have {len(images)} images and {len(labels)} labels", path=path)
     frames = {stamp: FramePictures(*files) for stamp, *files in zip(stamps_ns, images, labels, strict=True)}
-    return LogPictures(_track(arrays, path), frames)
+    return LogPictures(_track(arrays, path), frames, _faults(arrays, path))
 
 
 def read_track(path: Path) -> Track:
     """Read the track alone of what is kept of a log; a ResultError says that it is missing or malformed."""
-    return _track(read_arrays(path, _TRACK), path)
+    return _track(read_arrays(path, _TRACK, owner=path.stem), path)
+
+
+def read_faults(path: Path) -> tuple[str, ...]:
+    """Read alone what is wrong with a log's pictures; a ResultError says that the file is missing or malformed."""
+    return _faults(read_arrays(path, ("faults",), owner=path.stem), path)
+
+
+def _faults(arrays: Mapping[str, NDArray[Any]], path: Path) -> tuple[str, ...]:
+    found = arrays["faults"]
+    if found.ndim != 1 or found.dtype.kind != "U":
+        raise ResultError(f"has shape {found.shape}, type {found.dtype}", path=path, field="faults")
+    return tuple(found.tolist())
 
 
 def _track(arrays: Mapping[str, NDArray[Any]], path: Path) -> Track:

@@ -58,3 +58,9 @@ def test_json_holds_every_log_with_counts_and_findings(logs, capsys):
 def test_missing_log_is_a_mistake_of_the_user(logs, capsys):
     assert run("check", logs / "none.mcap") == 2
     assert "does not exist" in capsys.readouterr().err
+
+
+def test_strict_refuses_what_is_worth_a_look(logs, capsys):
+    assert run("check", logs) == 0
+    assert run("check", "--strict", logs) == 1
+    assert capsys.readouterr().err.endswith("1 logs checked, 1 with errors or warnings\n")

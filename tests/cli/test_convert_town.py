@@ -189,3 +189,19 @@ def test_a_disk_that_is_full_is_one_line_after_the_progress(define, tmp_path, mo
         f"Error: {tmp_path}/{LABELS[0]}.mcap: cannot be written: No space left on device; "
         "what is written is whole: make room, and the same command continues"
     ]
+
+
+def test_a_temporary_folder_that_is_full_is_one_line(tmp_path, monkeypatch, capsys):
+    def fill(**_options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/tmp/semgrid-town-x")
+
+    monkeypatch.setattr("semgrid_eval.sources.town.town.tempfile.TemporaryDirectory", fill)
+    code, lines = run(capsys, "synthetic", tmp_path / "logs", "--recordings", 2, "--workers", 1)
+    assert (code, lines) == (1, ["Error: /tmp/semgrid-town-x: No space left on device"])
+
+
+@pytest.mark.parametrize("seed", [str(2**31), str(2**64), "9" * 5000])
+def test_a_seed_that_no_generator_takes_is_one_line(seed, tmp_path, capsys):
+    code, lines = run(capsys, "synthetic", tmp_path / "logs", "--recordings", 2, "--seed", seed)
+    assert code in (1, 2)
+    assert lines[-1].startswith("Error: ")

@@ -3,42 +3,41 @@ import signal
 import subprocess
 import sys
 import threading
-import time
+from pathlib import Path
 
 import pytest
 from support.cityscapes_tree import Tree
+from support.driving import driving
 
 from semgrid_eval.cli.main import main
+from semgrid_eval.log.store import write_log
 
 LIMIT_S = 60
 
 
-def start(*arguments):
-    """Start the command line in a process of its own."""
-    command = [sys.executable, "-m", "semgrid_eval.cli.main", *(str(argument) for argument in arguments)]
-    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+STOPPED_AT = """
+import signal
+import sys
+import {module} as module
+
+def wait(*arguments, **options):
+    print("there", flush=True)
+    while True:
+        signal.pause()
+
+{place} = wait
+from semgrid_eval.cli.main import main
+main(sys.argv[1:])
+"""
 
 
-def until(found):
-    """Wait for what a function finds and return it."""
-    end_s = time.monotonic() + LIMIT_S
-    while time.monotonic() < end_s:
-        if result := found():
-            return result
-        time.sleep(0.01)
-    raise AssertionError("it did not come about in time")
-
-
-def opened(pipe):
-    """Open a named pipe to write to, once somebody reads it."""
-
-    def attempt():
-        try:
-            return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
-        except OSError:
-            return None
-
-    return until(attempt)
+def start(place, *arguments):
+    """Run the command line in a process of its own up to a call, which never ends, and return it."""
+    program = STOPPED_AT.format(module=place.rpartition(":")[0], place=f"module.{place.rpartition(':')[2]}")
+    command = [sys.executable, "-c", program, *(str(argument) for argument in arguments)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "there\n"
+    return process
 
 
 def told_at_termination(process):
@@ -63,26 +62,18 @@ print(sorted({"numpy", "pandas", "torch", "cv2"} & sys.modules.keys()))
 
 def test_a_terminated_conversion_leaves_nothing_half_written_and_says_that_it_goes_on(tmp_path):
     tree, logs = Tree(tmp_path / "src"), tmp_path / "logs"
-    (name,) = tree.write([0])
-    (tmp_path / "labels").mkdir()
-    os.mkfifo(tmp_path / "labels" / f"{name}.png")
-    process = start("convert", "cityscapes", tree.root, logs, "--labels", tmp_path / "labels", "--workers", 1)
-    digested = opened(tmp_path / "labels" / f"{name}.png")
-    os.write(digested, tree.label())
-    os.close(digested)
-    until(lambda: list(logs.rglob("*.part")))
-    converted = opened(tmp_path / "labels" / f"{name}.png")
+    tree.write([0])
+    there = "semgrid_eval.log.writer:MomentWriter.write"
+    process = start(there, "convert", "cityscapes", tree.root, logs, "--workers", 1)
+    assert len(list(logs.rglob("*.part"))) == 1
     assert told_at_termination(process) == (130, "Stopped; the same command continues from here.")
-    os.close(converted)
     assert [path for path in logs.rglob("*") if path.is_file()] == []
 
 
 def test_a_terminated_check_does_not_say_that_it_goes_on(tmp_path):
-    os.mkfifo(tmp_path / "log.mcap")
-    process = start("check", tmp_path / "log.mcap")
-    read = opened(tmp_path / "log.mcap")
+    (tmp_path / "log.mcap").touch()
+    process = start("semgrid_eval.log.check:check_log", "check", tmp_path / "log.mcap")
     assert told_at_termination(process) == (130, "Stopped.")
-    os.close(read)
 
 
 @pytest.fixture
@@ -120,3 +111,69 @@ def test_the_command_line_can_be_called_in_another_thread():
     thread.start()
     thread.join(LIMIT_S)
     assert codes == [0]
+
+
+CLOSED = """
+import os
+import sys
+
+for number in map(int, sys.argv.pop(1).split(",")):
+    os.close(number)
+os.execv(sys.executable, [sys.executable, "-m", "semgrid_eval.cli.main", *sys.argv[1:]])
+"""
+
+
+def called(*arguments, stdout=subprocess.PIPE, closed=""):
+    """Run the command line, some of its standard streams closed."""
+    program = ["-c", CLOSED, closed] if closed else ["-m", "semgrid_eval.cli.main"]
+    command = [sys.executable, *program, *(str(argument) for argument in arguments)]
+    return subprocess.run(command, stdout=stdout, stderr=subprocess.PIPE, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("logs") / "log.mcap"
+    write_log(driving(), path)
+    return path
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has it")
+@pytest.mark.parametrize("options", [["--json"], []])
+def test_a_full_output_is_one_line_and_exit_code_1(log, options):
+    with Path("/dev/full").open("w") as full:
+        done = called("check", log, *options, stdout=full)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == "Error: the output: No space left on device"
+    assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+
+
+@pytest.mark.parametrize("closed", ["2", "0,2", "0,1,2"])
+def test_closed_streams_change_neither_work_nor_exit_code(log, tmp_path, closed):
+    assert called("check", log, closed=closed).returncode == 0
+    assert called("check", tmp_path / "none.mcap", closed=closed).returncode == 2
+    (tmp_path / "bad.mcap").write_bytes(b"bad")
+    assert called("check", tmp_path / "bad.mcap", closed=closed).returncode == 1
+
+
+def test_a_reader_that_leaves_early_is_no_error_of_ours(log):
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = called("check", log, stdout=writer)
+    os.close(writer)
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert "Error" not in done.stderr
+
+
+def test_names_with_control_characters_are_shown_escaped(tmp_path, capsys):
+    name = "\x1b[31mred\u202e\n.mcap"
+    (tmp_path / name).write_bytes(b"bad")
+    with pytest.raises(SystemExit):
+        main(["check", str(tmp_path / name)])
+    with pytest.raises(SystemExit):
+        main(["grids", str(tmp_path), str(tmp_path / "out")])
+    said = capsys.readouterr()
+    for text in (said.out, said.err):
+        assert all(line.isprintable() for line in text.splitlines())
+        assert "\\x1b[31mred\\u202e\\n.mcap" in text

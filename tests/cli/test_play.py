@@ -8,6 +8,7 @@ from mcap.reader import make_reader
 from support.toy_world import street
 
 from semgrid_eval.cli.main import cli, main
+from semgrid_eval.errors import InputError
 from semgrid_eval.log.store import write_log
 
 
@@ -73,3 +74,43 @@ def test_a_users_mistake_is_told_without_a_traceback(here, capsys, arguments, co
     assert stop.value.code == code
     assert message in capsys.readouterr().err.splitlines()[-1]
     assert not Path("play.mcap").exists()
+
+
+@pytest.mark.parametrize("place", ["runs/first/run.json", "notes.md", "foreign.mcap"])
+def test_what_is_no_earlier_play_log_is_not_replaced_unless_it_is_forced(here, capsys, place):
+    for name in ("notes.md", "foreign.mcap"):
+        Path(name).write_text("precious")
+    before = Path(place).read_bytes()
+    with pytest.raises(SystemExit) as stop:
+        main(["play", "runs/first", "BL-DC", "--out", place])
+    assert stop.value.code == 1
+    assert capsys.readouterr().err.splitlines() == [
+        f"Error: {place}: exists and is not a log of `play`; name another file, or replace it with --force"
+    ]
+    assert Path(place).read_bytes() == before
+    if place != "runs/first/run.json":
+        call("play", "runs/first", "BL-DC", "--out", place, "--force")
+        call("play", "runs/first", "BL-NT", "--out", place)  # now it is one
+
+
+def test_a_layout_that_somebody_changed_is_not_replaced_unless_it_is_forced(here):
+    layout = Path("play.layout.json")
+    layout.write_text("{}")
+    for _ in range(2):
+        with pytest.raises(
+            InputError, match=r"play\.layout\.json: exists and is not a layout of `play`, or was changed"
+        ):
+            call("play", "runs/first", "BL-DC", "--out", "play.mcap")
+        call("play", "runs/first", "BL-DC", "--out", "play.mcap", "--force")
+        call("play", "runs/first", "BL-NT", "--out", "play.mcap")  # written by `play`, so it goes with its log
+        layout.write_text(layout.read_text().replace("BL-NT", "mine"))
+
+
+@pytest.mark.parametrize("place", ["logs/play.mcap", "logs/val/play.mcap", "logs/new/play.mcap", "others/play.mcap"])
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_no_play_log_is_put_among_logs(here, place, force):
+    Path("others").mkdir()
+    Path("others/toy.mcap").write_bytes(Path("logs/val/toy.mcap").read_bytes())
+    with pytest.raises(InputError, match="lies in a folder of logs, where it would be taken for one"):
+        call("play", "runs/first", "BL-DC", "--out", place, *force)
+    assert not Path(place).exists()

@@ -9,6 +9,7 @@ from support.toy_world import street
 
 from semgrid_eval.cli.main import cli, main
 from semgrid_eval.log.store import write_log
+from semgrid_eval.models.checkpoint import read_history, write_history
 from semgrid_eval.scores.results import read_run
 
 SMALL = {
@@ -95,7 +96,7 @@ def test_dry_run_counts_only_the_epochs_that_are_not_trained_yet(here):
     planned = [*arguments, "--out", "second", "--dry-run"]
     assert call(*planned).stdout.splitlines()[1].split("\t")[3:6] == ["0", "0", "0.0"]
     (history,) = (here / "trainings").glob("*/history.csv")
-    history.write_text("".join(history.read_text().splitlines(keepends=True)[:-1]))
+    write_history(history, read_history(history)[:-1])
     assert call(*planned).stdout.splitlines()[1].split("\t")[3:5] == ["3", "6"]
 
 
@@ -192,3 +193,21 @@ def test_a_users_mistake_is_one_line_without_a_traceback(here, capsys, arguments
     assert len(lines) == 1
     assert lines[0].startswith("Error: ")
     assert message in lines[0]
+
+
+def test_what_is_damaged_is_made_again_with_a_line_each(here, capsys):
+    arguments = ["run", matrix(here, [{"name": "BL-DC", "model": "newest"}]), "--logs", "logs", "--out", "run"]
+    kinds = {"results/*/sums.npz": "result is", "windows/*.npz": "windows are", "grids/*.npz": "grids are"}
+    call(*arguments)
+    for pattern in kinds:
+        path = min((here / "run").glob(pattern))
+        content = bytearray(path.read_bytes())
+        content[50] ^= 1
+        path.write_bytes(content)
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 0
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("Warning: ")]
+    for pattern, word in kinds.items():
+        assert [line for line in said if pattern.partition("/")[0] in line and f"the {word}" in line], said

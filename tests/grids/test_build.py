@@ -185,3 +185,24 @@ def test_class_map_moves_a_label_to_another_class(tmp_path):
     assert CLASS_NAMES.index("sidewalk") in plain.grids
     assert CLASS_NAMES.index("sidewalk") not in changed.grids
     assert CLASS_NAMES.index("vegetation") not in changed.grids
+
+
+def test_motion_that_no_vehicle_has_gives_no_grids(tmp_path, monkeypatch):
+    monkeypatch.setattr("semgrid_eval.log.writer.implausible", lambda sample: None)  # as another writer would
+    with pytest.raises(LogError, match=r"toy\.mcap: /ego/motion at \d+ ns: speed_mps: 1e\+06 m/s is not within"):
+        built(street(1, frames=2, speed_mps=1e6), tmp_path)
+
+
+def test_grids_with_a_flipped_bit_are_made_again_alike_and_a_line_says_so(tmp_path, caplog):
+    log = tmp_path / "log.mcap"
+    write_log(street(1, frames=3).recording(), log)
+    build_grids([log], tmp_path / "grids", GridConfig())
+    (kept,) = (tmp_path / "grids").glob("*.npz")
+    whole, rng = kept.read_bytes(), np.random.default_rng(0)
+    for made, at in enumerate(rng.integers(len(whole), size=5), start=1):
+        content = bytearray(whole)
+        content[at] ^= 1 << rng.integers(8)
+        kept.write_bytes(content)
+        assert build_grids([log], tmp_path / "grids", GridConfig()).built == 1
+        assert kept.read_bytes() == whole
+        assert len([text for text in caplog.messages if "the grids are made again" in text]) == made

@@ -12,6 +12,12 @@ from semgrid_eval.recording.png import encode_gray
 # Every frame of this recording has all pictures, and nothing about it is odd.
 
 
+@pytest.fixture(autouse=True)
+def by_another_writer(monkeypatch):
+    """Let logs be written that a conversion refuses."""
+    monkeypatch.setattr("semgrid_eval.log.writer.implausible", lambda sample: None)
+
+
 def smooth(change=lambda number, moment: moment, frames=8):
     """Moments of a plain drive, each changed by `change`."""
     full = next(driving().moments()).cameras["front"]
@@ -193,3 +199,15 @@ def test_values_that_are_no_labels_are_a_warning(tmp_path):
     train_ids = encode_gray(np.full((32, 64), 255, np.uint8))
     found = findings(tmp_path, lambda number, moment: with_frame(moment, label_png=train_ids))
     assert "[255], which are not Cityscapes label ids" in found["/camera/front/label"][1]
+
+
+def test_a_damaged_attachment_is_an_error_where_no_checksum_of_all_data_tells(tmp_path):
+    path = tmp_path / "log.mcap"
+    write_log(replace(driving(), source_files={"notes.txt": b"precious notes"}), path)
+    data = path.read_bytes().replace(b"precious notes", b"precious votes")
+    at = data.rindex(b"\x0f\x04" + bytes(7))  # the record that ends the data: its checksum is optional
+    path.write_bytes(data[: at + 9] + bytes(4) + data[at + 13 :])
+    found = [finding for finding in check_log(path).findings if finding.severity is Severity.ERROR]
+    assert [finding.message for finding in found] == [
+        "is damaged: the checksum of attachment 'notes.txt' does not match"
+    ]

@@ -1,3 +1,4 @@
+import os
 import random
 from pathlib import Path
 
@@ -94,7 +95,7 @@ def test_any_flipped_bit_fails_the_check_of_the_whole_file(whole, tmp_path):
 def test_missing_file_and_folder_are_named(tmp_path):
     with pytest.raises(LogError, match=r"log\.mcap: cannot be read: No such file"):
         LogReader(tmp_path / "log.mcap")
-    with pytest.raises(LogError, match="cannot be read: Is a directory"):
+    with pytest.raises(LogError, match="is not a regular file"):
         LogReader(tmp_path)
 
 
@@ -165,3 +166,19 @@ def test_file_without_checksum_of_its_data_is_digested_as_a_whole(tmp_path):
         digests.add(container.digest)
         container.close()
     assert len(digests) == 2
+
+
+def test_times_that_no_clock_has_are_refused_before_anything_is_read(tmp_path):
+    foreign(tmp_path / "log.mcap", [("/a", 2**63 - 1, b"a")])
+    assert read(tmp_path / "log.mcap") == [(2**63 - 1, b"a")]
+    for late_ns in (2**63, 2**64 - 1):
+        foreign(tmp_path / "log.mcap", [("/a", late_ns, b"a")])
+        with pytest.raises(LogError, match=r"times of 2\^63 ns or more"):
+            Container(tmp_path / "log.mcap")
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: path.symlink_to("/dev/zero")])
+def test_what_is_no_file_is_refused_and_not_waited_for(tmp_path, make):
+    make(tmp_path / "log.mcap")
+    with pytest.raises(LogError, match="is not a regular file"):
+        Container(tmp_path / "log.mcap")

@@ -105,7 +105,8 @@ def test_errors_of_the_consumer_are_not_taken_for_damage(tmp_path):
 
 
 @pytest.mark.parametrize("changed", [{"name": "../street"}, {"split": ".."}, {"name": ""}])
-def test_log_whose_name_leads_elsewhere_is_refused(tmp_path, changed):
+def test_log_whose_name_leads_elsewhere_is_refused(tmp_path, changed, monkeypatch):
+    monkeypatch.setattr("semgrid_eval.log.store.require_file_name", lambda *_: None)  # as another writer would
     write_log(replace(driving(), **changed), tmp_path / "log.mcap")
     with pytest.raises(LogError, match="is not a file name"):
         LogReader(tmp_path / "log.mcap")

@@ -276,3 +276,48 @@ def test_logs_in_linked_folders_are_found_once_and_links_in_a_circle_end(tmp_pat
         "logs/a/y.mcap",
         "logs/linked/x.mcap",
     ]
+
+
+@pytest.mark.parametrize("changes", [{"name": "a\0b"}, {"name": "x" * 300}, {"split": "\0"}, {"name": "a/b"}])
+def test_a_name_that_no_file_can_have_is_refused_by_writer_and_reader(tmp_path, changes):
+    with pytest.raises(InputError, match="is not a file name of at most 200 bytes"):
+        write_log(replace(driving(), **changes), tmp_path / "log.mcap")
+    entries = replace(Scene("a", "d", "val", (), ""), **changes).to_metadata()
+    with pytest.raises(ValueError, match="is not a file name of at most 200 bytes"):
+        Scene.from_metadata(entries)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"speed_mps": 1e6}, r"speed_mps: 1e\+06 m/s is not within -15 to 70"),
+        ({"speed_mps": 1e308}, "speed_mps: "),
+        ({"speed_mps": -1e300}, "speed_mps: "),
+        ({"speed_mps": float("nan")}, "speed_mps: nan m/s"),
+        ({"yaw_rate_radps": 2.0}, "yaw_rate_radps: 2 rad/s is not within -1.5 to 1.5"),
+        ({"stamp_ns": 2**63}, "beyond 2"),
+    ],
+)
+def test_motion_that_no_vehicle_has_is_not_converted(tmp_path, changes, message):
+    recording = driving()
+    moments = [
+        replace(moment, motion=tuple(replace(s, **changes) for s in moment.motion)) for moment in recording.moments()
+    ]
+    with pytest.raises(InputError, match=message):
+        write_log(replace(recording, moments=lambda: iter(moments)), tmp_path / "log.mcap")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_that_cannot_be_decoded_is_not_converted(tmp_path):
+    recording = driving()
+
+    def moments():
+        for moment in recording.moments():
+            broken = {
+                name: replace(f, image_png=f.disparity_png[:-30] + f.disparity_png[-12:])
+                for name, f in moment.cameras.items()
+            }
+            yield replace(moment, cameras=broken)
+
+    with pytest.raises(InputError, match=r"/image at \d+ ns: is a damaged PNG file"):
+        write_log(replace(recording, moments=moments), tmp_path / "log.mcap")

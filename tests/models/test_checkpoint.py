@@ -42,10 +42,12 @@ def test_damaged_missing_or_foreign_files_are_named(tmp_path):
     save_weights(small(), good)
     cut.write_bytes(good.read_bytes()[:-100])
     save_file({"a": torch.zeros(1)}, foreign)
-    with pytest.raises(InputError, match=r"cut\.safetensors: cannot be read"):
+    with pytest.raises(InputError, match=r"cut\.safetensors: is damaged: its content does not match its seal"):
         load_weights(small(), cut)
-    with pytest.raises(InputError, match=r"foreign\.safetensors: holds no network"):
+    with pytest.raises(InputError, match=r"foreign\.safetensors: is damaged, or of another version: it has no seal"):
         load_weights(small(), foreign)
+    with pytest.raises(InputError, match=r"good\.safetensors: belongs to another id \(-, not me\)"):
+        load_weights(small(), good, owner="me")
     with pytest.raises(InputError, match=r"none\.safetensors: cannot be read"):
         load_weights(small(), tmp_path / "none.safetensors")
     wider = network(EncoderDecoder, given(inputs=4), depth=2, features=8)

@@ -9,7 +9,7 @@ from support.recordings import random_recording
 
 from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
-from semgrid_eval.models.model import Model
+from semgrid_eval.models.model import Model, require_scores
 from semgrid_eval.models.network import Network
 from semgrid_eval.models.registry import ENTRY_POINT_GROUP, find_model, is_named, version_of
 from semgrid_eval.windows.data import Window, select_windows
@@ -195,6 +195,10 @@ def raising(batch):
     raise KeyError("key")
 
 
+def leaving(batch):
+    raise GeneratorExit
+
+
 def guarded(tmp_path, base, answer):
     """A model of that base from a file, whose answers are these."""
     path = tmp_path / "own.py"
@@ -219,11 +223,13 @@ def guarded(tmp_path, base, answer):
         (lambda batch: torch.zeros(2, 10, 16, 16, dtype=torch.int64), "floating-point type is needed"),
         (lambda batch: torch.full((2, 10, 16, 16), torch.nan), "NaN or infinite"),
         (raising, "raised KeyError: 'key'"),
+        (leaving, "raised GeneratorExit"),
     ],
 )
 def test_wrong_answers_are_one_line_that_names_the_model(tmp_path, batch, base, answer, message):
+    model = guarded(tmp_path, base, answer)
     with pytest.raises(InputError, match=message) as caught:
-        guarded(tmp_path, base, answer).predict(batch)
+        require_scores(model.predict(batch), batch, model.called)
     assert str(caught.value).startswith(f"{tmp_path}/own.py:Own: ")
     assert "\n" not in str(caught.value)
 

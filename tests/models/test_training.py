@@ -1,5 +1,6 @@
 """Training: the masked loss, what is learnt, and that a stopped training ends in the same bytes."""
 
+import numpy as np
 import pandas as pd
 import pytest
 import torch
@@ -106,34 +107,47 @@ def test_complete_training_is_read_and_not_repeated(tmp_path):
 
 def test_folder_of_another_training_is_refused(tmp_path):
     quick(tmp_path)
-    with pytest.raises(InputError, match=r"weights\.safetensors: belongs to another training"):
+    with pytest.raises(InputError, match=r"weights\.safetensors: belongs to another id"):
         quick(tmp_path, seed=2)
     (tmp_path / WEIGHTS_FILE).unlink()
     with pytest.raises(KeyboardInterrupt):
         quick(tmp_path, progress=StopAfter(2))
-    with pytest.raises(InputError, match=r"checkpoint\.pt: belongs to another training"):
+    with pytest.raises(InputError, match=r"checkpoint\.pt: belongs to another id"):
         quick(tmp_path, windows=windows_of(7))
 
 
-def test_damaged_checkpoint_is_named(tmp_path):
-    with pytest.raises(KeyboardInterrupt):
-        quick(tmp_path, progress=StopAfter(2))
-    path = tmp_path / CHECKPOINT_FILE
-    path.write_bytes(path.read_bytes()[:500])
-    with pytest.raises(InputError, match=r"checkpoint\.pt: is damaged; delete it"):
+def flip(path, at, bit=0):
+    content = bytearray(path.read_bytes())
+    content[at % len(content)] ^= 1 << bit
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("name", [CHECKPOINT_FILE, WEIGHTS_FILE, HISTORY_FILE])
+def test_a_training_with_a_flipped_bit_is_made_again_alike_and_a_line_says_so(tmp_path, caplog, name, seed):
+    if name == CHECKPOINT_FILE:
+        with pytest.raises(KeyboardInterrupt):
+            quick(tmp_path, progress=StopAfter(2))
+    else:
         quick(tmp_path)
+    rng = np.random.default_rng(seed)
+    flip(tmp_path / name, int(rng.integers(1 << 40)), int(rng.integers(8)))
+    quick(tmp_path)
+    quick(tmp_path / "whole")
+    assert (tmp_path / WEIGHTS_FILE).read_bytes() == (tmp_path / "whole" / WEIGHTS_FILE).read_bytes()
+    assert [record.getMessage() for record in caplog.records if f"{name}: is damaged" in record.getMessage()]
 
 
 def test_history_has_a_row_for_each_epoch(tmp_path):
     quick(tmp_path, validation=windows_of(9))
-    history = pd.read_csv(tmp_path / HISTORY_FILE)
+    history = pd.read_csv(tmp_path / HISTORY_FILE, comment="#")
     assert list(history.columns) == ["epoch", "updates", "learning_rate", "loss", "validation_loss", "seconds"]
     assert history["epoch"].tolist() == [1, 2, 3]
     assert history["updates"].tolist() == [3, 6, 9]
     assert history["learning_rate"].tolist() == [1e-3, 1e-3, 1e-4]
     assert history["validation_loss"].notna().all()
     quick(tmp_path / "without")
-    assert pd.read_csv(tmp_path / "without" / HISTORY_FILE)["validation_loss"].isna().all()
+    assert pd.read_csv(tmp_path / "without" / HISTORY_FILE, comment="#")["validation_loss"].isna().all()
 
 
 def test_validation_leaves_the_weights_alone(tmp_path):

@@ -3,6 +3,7 @@ import re
 import pytest
 from support.fake_run import facts
 
+from semgrid_eval.errors import printable
 from semgrid_eval.playback.backdrop import prediction_topic, viewer_layout
 from semgrid_eval.scores.results import RowRecord
 
@@ -41,10 +42,10 @@ def test_grids_of_the_row_and_all_its_sensors_are_shown_in_their_own_colours():
             assert (settings["visible"], settings["colorMode"]) == (True, "rgba-fields")
 
 
-@pytest.mark.parametrize("name", ['say "hi" \\ {camera}', "a/b c", "Zürich\n"])
+@pytest.mark.parametrize("name", ['say "hi" \\ {camera}', "a/b c", "Zürich\n", "\x1b[31mred"])
 def test_any_name_of_a_row_gives_a_layout_and_a_plain_topic(name):
     shown = viewer_layout(row(name), ("front",))["configById"]["3D!prediction"]
-    assert shown["foxglovePanelTitle"] == f"Prediction of {name}"
+    assert shown["foxglovePanelTitle"] == f"Prediction of {printable(name)}"
     assert list(shown["topics"]) == [prediction_topic(name)]
     assert re.fullmatch(r"/grid/prediction/[\w.-]+", prediction_topic(name))
 

@@ -236,7 +236,7 @@ def test_arrays_of_another_shape_are_refused(run, tmp_path):
     shutil.copytree(run, copy)
     for path in copy.glob("windows/*.npz"):
         arrays = results.read_arrays(path, ("inputs", "target", "mask"))
-        results.write_arrays(path, {**arrays, "target": arrays["target"][:, :-1]})
+        results.write_arrays(path, {**arrays, "target": arrays["target"][:, :-1]}, owner=path.stem)
     with pytest.raises(InputError, match=r"target: has shape \(16, 127, 128\), not \(16, 128, 128\)"):
         write_playback(copy, "BL-DC", tmp_path / "play.mcap")
 

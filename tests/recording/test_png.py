@@ -19,6 +19,7 @@ from semgrid_eval.recording.png import (
     decode_ids,
     encode_gray,
     read_header,
+    require_pixels,
     with_palette,
 )
 
@@ -184,3 +185,63 @@ def test_gray_pictures_come_out_as_equal_channels():
 def test_colour_pictures_of_16_bits_are_refused():
     with pytest.raises(InputError, match="at most 8 bits a channel are needed"):
         decode_colour(encode_gray(np.zeros((2, 2), np.uint16)))
+
+
+def with_pixels(header: tuple[int, ...], packed: bytes) -> bytes:
+    return b"".join(
+        [b"\x89PNG\r\n\x1a\n", chunk(b"IHDR", struct.pack(">IIBBBBB", *header)), chunk(b"IDAT", packed)]
+    ) + chunk(b"IEND", b"")
+
+
+LINES = b"".join(bytes([0, *range(5)]) for _ in range(4))  # 5 x 4 pixels of 8 bits
+SOUND = (5, 4, 8, 0, 0, 0, 0)
+
+
+@pytest.mark.parametrize("mode", ["1", "L", "P", "RGB", "RGBA", "LA", "I;16"])
+@pytest.mark.parametrize("size", [(1, 1), (3, 9), (17, 5)])
+def test_all_pixels_of_whole_pictures_are_there(mode, size):
+    stream = io.BytesIO()
+    Image.new(mode, size).save(stream, "PNG")
+    assert require_pixels(stream.getvalue())[:2] == size
+
+
+@pytest.mark.parametrize("size", [(1, 1), (5, 4), (9, 8), (2, 17)])
+def test_all_pixels_of_interlaced_pictures_are_there(size):
+    firsts = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
+    lines = [
+        bytes(1 + len(range(x, size[0], across)))
+        for x, y, across, down in firsts
+        for _ in range(y, size[1], down)
+        if range(x, size[0], across)
+    ]
+    data = with_pixels((*size, 8, 0, 0, 0, 1), zlib.compress(b"".join(lines)))
+    assert require_pixels(data)[:2] == size
+    assert Image.open(io.BytesIO(data)).size == size
+
+
+@pytest.mark.parametrize(
+    ("header", "packed", "message"),
+    [
+        (SOUND, zlib.compress(LINES[:-1]), "too few pixels"),
+        (SOUND, zlib.compress(LINES)[:-6], "too few pixels|do not end"),
+        (SOUND, zlib.compress(LINES + b"1"), "do not end where they should"),
+        (SOUND, zlib.compress(LINES)[:-1], "do not end where they should"),
+        (SOUND, zlib.compress(LINES)[:-1] + b"1", "incorrect data check"),
+        (SOUND, zlib.compress(b"\x05" + LINES[1:]), "a line of pixels begins wrongly"),
+        ((5, 4, 8, 0, 0, 0, 1), zlib.compress(LINES), "pixels"),
+        ((5, 4, 8, 0, 0, 0, 2), zlib.compress(LINES), "its header is impossible"),
+        ((5, 4, 8, 0, 1, 0, 0), zlib.compress(LINES), "its header is impossible"),
+        ((5, 4, 4, 2, 0, 0, 0), zlib.compress(LINES), "its header is impossible"),
+        (SOUND, b"junk", "incorrect header check"),
+    ],
+)
+def test_pictures_whose_chunks_are_sound_and_whose_pixels_are_not_are_refused(header, packed, message):
+    require_pixels(with_pixels(SOUND, zlib.compress(LINES)))
+    with pytest.raises(InputError, match=f"is a damaged PNG file: .*({message})"):
+        require_pixels(with_pixels(header, packed))
+
+
+def test_pixels_that_would_fill_the_memory_are_not_unpacked():
+    bomb = zlib.compress(bytes(1 << 24))
+    with pytest.raises(InputError, match="do not end where they should"):
+        require_pixels(with_pixels((1, 1, 8, 0, 0, 0, 0), bomb))

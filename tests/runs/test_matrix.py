@@ -1,5 +1,6 @@
 import csv
 import importlib.metadata
+import os
 from importlib import resources
 
 import pytest
@@ -379,3 +380,26 @@ def test_a_row_without_sensors_sees_those_of_its_target(tmp_path):
     file.write_text("rows: [{name: plain, model: newest, grid: {sensors: {a: {}}}}]")
     with pytest.raises(ConfigError, match="grid: target: 'full' is not one of the sensors a"):
         load_matrix(str(file))
+
+
+@pytest.mark.parametrize("seed", ["-1", str(2**53 + 1), str(2**64), "9" * 5000, "0x" + "f" * 5000])
+def test_a_seed_that_no_generator_takes_is_one_line(tmp_path, seed):
+    (tmp_path / "m.yaml").write_text(f"seed: {seed}\nrows: [{{name: a, model: newest}}]")
+    with pytest.raises(ConfigError) as caught:
+        load_matrix(str(tmp_path / "m.yaml"))
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 300
+
+
+def test_a_batch_beyond_all_memory_is_one_line(tmp_path):
+    rows = [{"name": "a", "model": "ed", "settings": {"training": {"batch": 10**9}}}]
+    (tmp_path / "m.yaml").write_text(yaml.safe_dump({"rows": rows}))
+    with pytest.raises(ConfigError, match=r"settings\.training\.batch: Input should be less than or equal to 65536"):
+        load_matrix(str(tmp_path / "m.yaml"))
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: path.symlink_to("/dev/zero")])
+def test_a_matrix_that_is_no_file_is_not_waited_for(tmp_path, make):
+    make(tmp_path / "m.yaml")
+    with pytest.raises(ConfigError, match=r"m\.yaml: is "):
+        load_matrix(str(tmp_path / "m.yaml"))

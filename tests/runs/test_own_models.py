@@ -306,13 +306,42 @@ def test_a_model_that_cheats_or_leaves_is_stopped(logs, tmp_path):
         "class Leaves(Model):\n"
         "    def predict(self, batch):\n"
         "        raise SystemExit(3)\n"
+        "class Ends(Model):\n"
+        "    def fit(self, windows):\n"
+        "        raise BaseException('of no kind')\n"
     )
-    rows = [{"name": name, "model": f"{tmp_path}/bad.py:{name}"} for name in ("Peeks", "Leaves")]
+    rows = [{"name": name, "model": f"{tmp_path}/bad.py:{name}"} for name in ("Peeks", "Leaves", "Ends")]
     record = run(rows, logs, tmp_path / "run")
     counts = results.read_sums(results.result_folder(tmp_path / "run", record.rows[0].results[0]), "iou", "all")[:, 0]
     assert counts[:, :, 1:].sum() == 0  # the target that it saw was empty, and so is its answer
     assert counts.sum() > 10_000  # and its mask was not ours
     assert "raised SystemExit: 3" in str(record.rows[1].failure)
+    assert "raised BaseException: of no kind" in str(record.rows[2].failure)
+
+
+def test_rows_whose_results_a_model_removes_are_named_and_made_again(logs, tmp_path):
+    (tmp_path / "vandal.py").write_text(
+        "import shutil\n"
+        "from semgrid_eval.models.model import Model, one_hot\n"
+        "class Vandal(Model):\n"
+        "    files = ()\n"
+        "    def predict(self, batch):\n"
+        f"        shutil.rmtree({str(tmp_path / 'run')!r}, ignore_errors=True)\n"
+        "        return one_hot(batch.past[:, 0, -1])\n"
+    )
+    rows = [{"name": "BL-DC", "model": "newest"}, {"name": "vandal", "model": f"{tmp_path}/vandal.py:Vandal"}]
+    rows.append({"name": "BL-Fuse", "model": "fuse"})
+    record = run(rows, logs, tmp_path / "run")
+    failures = {row.name: row.failure for row in record.rows}
+    assert "its result was removed while the run went on" in failures.pop("BL-DC")
+    assert failures == {"vandal": None, "BL-Fuse": None}
+    assert results.read_run(tmp_path / "run") == record
+    again = run(rows, logs, tmp_path / "run")
+    assert [row.failure for row in again.rows] == [None] * 3
+    for row in again.rows:
+        results.read_windows(
+            tmp_path / "run", results.read_result(results.result_folder(tmp_path / "run", row.results[0])).windows_id
+        )
 
 
 WITH_WEIGHTS = """

@@ -23,7 +23,7 @@ rows:
 def outputs(out):
     """Everything that numbers come from, by name; durations are no such thing."""
     report = write_report(out).parent
-    files = [report / "scores.csv"]
+    files = [report / f"{name}.csv" for name in ("scores", "summary", "training", "settings", "calibration", "windows")]
     files += [*out.glob("results/*/sums.npz"), *out.glob("results/*/predictions.npz"), *out.glob("windows/*.npz")]
     files += [*out.glob("trainings/*/weights.safetensors")]
     return {str(path.relative_to(out)): path.read_bytes() for path in files}

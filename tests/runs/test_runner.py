@@ -77,7 +77,7 @@ def test_a_run_leaves_results_that_parse_and_belong_together(logs, tmp_path):
     assert history["validation_loss"].notna().all()
 
 
-def test_a_second_start_does_nothing_and_a_lost_result_is_made_again_alike(logs, tmp_path):
+def test_a_second_start_does_nothing_and_a_damaged_result_is_made_again_alike(logs, tmp_path, caplog):
     out = tmp_path / "run"
     rows = [{"name": "BL-DC", "model": "newest"}, {"name": "ED-DC", "model": "ed"}]
     record = run(rows, logs, out)
@@ -87,10 +87,15 @@ def test_a_second_start_does_nothing_and_a_lost_result_is_made_again_alike(logs,
     assert before == {path: path.stat().st_mtime_ns for path in before}
     counts, text = (folder / "sums.npz").read_bytes(), json.loads((folder / "result.json").read_text())
     (folder / "sums.npz").write_bytes(counts[:100])
+    assert caplog.messages == []
     run(rows, logs, out)
+    assert caplog.messages == [
+        f"{folder}/sums.npz: is damaged, or of another version: it has no seal; the result is made again"
+    ]
     assert (folder / "sums.npz").read_bytes() == counts
     again = json.loads((folder / "result.json").read_text())
-    del text["predict_seconds"], again["predict_seconds"]
+    for record in (text, again):
+        del record["predict_seconds"], record["seal"]
     assert text == again
 
 

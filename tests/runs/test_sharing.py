@@ -84,11 +84,12 @@ def test_a_misspelt_row_is_told_before_anything_is_built(work, tmp_path):
 
 def test_a_training_that_is_complete_is_read_without_writing(work):
     work([ED])
-    (lock,) = (work.out / "trainings").rglob(".lock")
-    lock.unlink()
+    (training,) = (work.out / "trainings").iterdir()
+    before = training.stat().st_mtime_ns
     shutil.rmtree(work.out / "results")
     assert failures(work([ED])) == {"ED": None}
-    assert not lock.exists()
+    assert training.stat().st_mtime_ns == before
+    assert {path.name for path in training.iterdir()} == {"weights.safetensors", "history.csv"}
 
 
 def test_where_there_are_no_locks_nobody_waits(tmp_path, monkeypatch):

@@ -1,6 +1,7 @@
 import dataclasses
 import io
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,14 +11,16 @@ from support.own_clock import with_own_motion
 from support.toy_world import FRAME_NS, HEIGHT, START_NS, WIDTH, png, street
 
 from semgrid_eval.classes import LABEL_ID, label_palette
-from semgrid_eval.errors import LogError
+from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.executors import InProcess, Processes
+from semgrid_eval.files import read_json
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
-from semgrid_eval.recording.png import decode_ids
+from semgrid_eval.recording.png import decode_ids, read_header
+from semgrid_eval.report.page.write import write_report
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.runs.thumbnails import log_pictures, small_image, small_label
@@ -102,8 +105,24 @@ def test_labels_are_sampled_not_mixed_and_have_their_colours():
 
 
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff\xe0 a photo", png(np.zeros((9, 9, 3), np.uint8))[:60]])
-def test_what_cannot_be_decoded_gives_no_picture(data):
-    assert small_image(data) == small_label(data) == b""
+def test_what_cannot_be_decoded_is_told(data):
+    for small in (small_image, small_label):
+        with pytest.raises(InputError, match="PNG file"):
+            small(data)
+
+
+def with_broken_image(recording, stamp_ns):
+    """Break the colour image of one moment: its pixels are cut short, and all checksums hold."""
+
+    def moments():
+        for moment in recording.moments():
+            frame = moment.cameras["front"]
+            if moment.stamp_ns == stamp_ns:
+                image_png = png(np.zeros((9, 9, 3), np.uint8))[:33] + png(np.zeros((1, 1, 3), np.uint8))[33:]
+                frame = replace(frame, image_png=image_png)
+            yield replace(moment, cameras={"front": frame})
+
+    return replace(recording, moments=moments)
 
 
 def test_a_second_start_makes_nothing_and_a_later_row_adds_its_frames(logs, tmp_path):
@@ -203,7 +222,23 @@ def test_the_track_is_kept_with_the_camera_that_sees_it(logs, tmp_path):
     assert (x / w * WIDTH - 0.5, y / w * HEIGHT - 0.5, w) == pytest.approx((u, v, depth_m[v, u]))
 
 
-def test_a_log_that_is_damaged_after_its_grids_were_built_costs_no_result(logs, tmp_path):
+def test_a_damaged_image_of_a_log_is_named_on_the_page(tmp_path, monkeypatch):
+    monkeypatch.setattr("semgrid_eval.log.writer.require_pixels", read_header)  # as another writer would
+    for i in range(2):
+        recording = street(i, frames=9).recording(f"toy{i}")
+        recording = with_broken_image(recording, START_NS + 5 * FRAME_NS) if i else recording
+        write_log(recording, tmp_path / "logs" / "val" / f"toy{i}.mcap")
+    run(tmp_path / "logs", tmp_path / "run", SHORT)
+    run(tmp_path / "logs", tmp_path / "run", SHORT, LONG)  # what was found once is known
+    damages = []
+    page = write_report(tmp_path / "run", damaged=damages.append)
+    fault = f"image at {START_NS + 5 * FRAME_NS} ns is a damaged PNG file"
+    assert [failure["name"] for failure in read_json(page.parent / "report.json")["failures"]] == ["toy1"]
+    assert fault in page.read_text()
+    assert damages == []  # the run's own files are whole
+
+
+def test_a_log_that_is_damaged_after_its_grids_were_built_costs_no_result(logs, tmp_path, caplog):
     copy = tmp_path / "logs"
     shutil.copytree(logs, copy)
     run(copy, tmp_path / "first", SHORT, pictures=False)
@@ -215,3 +250,4 @@ def test_a_log_that_is_damaged_after_its_grids_were_built_costs_no_result(logs, 
     assert record.rows[0].failure is None
     assert len(results.read_result(results.result_folder(tmp_path / "second", record.rows[0].results[0])).windows) == 2
     assert len(files(tmp_path / "second")) == 1
+    assert [text for text in caplog.messages if text.startswith(f"{log}: is damaged")]

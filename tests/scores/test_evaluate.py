@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 import torch
-from support.models import made
+from support.models import made, network
 from support.recordings import random_recording
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import InputError
+from semgrid_eval.models.encoder_decoder import EncoderDecoder
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.newest import RepeatNewest
 from semgrid_eval.scores.evaluate import evaluate
@@ -45,7 +46,7 @@ def test_regions_equal_counting_cell_by_cell(batch):
 
 
 def test_class_and_certainty_are_those_of_the_largest_score_in_each_cell():
-    scores = torch.rand(3, CLASS_COUNT, 16, 16, generator=torch.Generator().manual_seed(0)) * 1.2
+    scores = torch.rand(3, CLASS_COUNT, 16, 16, generator=torch.Generator().manual_seed(0))
     windows = windows_of(*(random_recording(seed) for seed in range(3)))
 
     class Fixed(Model):
@@ -56,7 +57,30 @@ def test_class_and_certainty_are_those_of_the_largest_score_in_each_cell():
     for n, row, column in np.ndindex(scored.prediction.shape):
         cell = scores[n, :, row, column].tolist()
         assert scored.prediction[n, row, column] == cell.index(max(cell))
-        assert scored.certainty[n, row, column] == round(min(max(cell), 1.0) * 255)
+        assert scored.certainty[n, row, column] == round(max(cell) * 255)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [(torch.nan, "NaN or infinite"), (torch.inf, "NaN or infinite"), (1.2, "from 1 to 1.2, and scores go from 0 to 1")],
+)
+def test_no_answer_is_scored_that_is_not_scores_whoever_gives_it(value, message):
+    class Fixed(Model):
+        def predict(self, batch):
+            scores = torch.ones(len(batch.target), CLASS_COUNT, 16, 16)
+            scores[0, 3, 4, 5] = value
+            return scores
+
+    with pytest.raises(InputError, match=f"^Fixed: .*{message}"):
+        evaluate(made(Fixed), windows_of(random_recording(0)))
+
+
+def test_weights_that_are_all_nan_are_not_scored():
+    net = network(EncoderDecoder, depth=2, features=4).eval()
+    for parameter in net.parameters():
+        parameter.data.fill_(torch.nan)
+    with pytest.raises(InputError, match=r"^EncoderDecoder: gave scores that are NaN or infinite"):
+        evaluate(net, windows_of(random_recording(0)))
 
 
 def test_no_window_is_an_error():

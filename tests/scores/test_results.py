@@ -1,5 +1,7 @@
 """Sums on disk: of every metric by every partition that is known, and faults by name."""
 
+import os
+
 import numpy as np
 import pytest
 from support.windows import random_windows
@@ -73,3 +75,18 @@ def test_the_digest_of_a_log_is_that_which_was_scored(path, expected):
     run = RunRecord.model_construct(logs=records)
     result = ResultRecord.model_construct(log_digests=("other", "scored"))
     assert scored_digest(run, result, path) == expected
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: path.symlink_to("/dev/zero")])
+def test_sums_that_are_no_file_are_not_waited_for(tmp_path, make):
+    make(tmp_path / "sums.npz")
+    with pytest.raises(ResultError, match=r"sums\.npz: is not a regular file"):
+        read_sums(tmp_path, "iou", "all")
+
+
+def test_sums_of_another_result_are_refused(tmp_path):
+    for name in ("one", "other"):
+        write_sums(tmp_path / name, counted())
+    (tmp_path / "one" / "sums.npz").replace(tmp_path / "other" / "sums.npz")
+    with pytest.raises(ResultError, match=r"sums\.npz: belongs to another id \(one, not other\)"):
+        read_sums(tmp_path / "other", "iou", "all")

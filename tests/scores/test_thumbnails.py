@@ -13,6 +13,7 @@ from semgrid_eval.scores.thumbnails import (
     LogPictures,
     Track,
     pictures_file,
+    read_faults,
     read_pictures,
     read_track,
     write_pictures,
@@ -21,25 +22,37 @@ from semgrid_eval.sensors.camera import CameraSensor
 
 TRACK = Track(-7, np.array([1, 2]), np.array([[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]), np.arange(12.0).reshape(3, 4))
 FRAMES = {5: FramePictures(b"five", b"labels"), -3: FramePictures(), 9: FramePictures(label=b"nine")}
-PICTURES = LogPictures(TRACK, FRAMES)
-NAMES = ("stamps_ns", "images", "image_ends", "labels", "label_ends", "start_ns", "track_ns", "track", "projection")
+PICTURES = LogPictures(TRACK, FRAMES, ("toy: /image at 5 ns is damaged",))
+NAMES = (
+    "stamps_ns",
+    "images",
+    "image_ends",
+    "labels",
+    "label_ends",
+    "start_ns",
+    "track_ns",
+    "track",
+    "projection",
+    "faults",
+)
 
 
 @settings(max_examples=30)
 @given(st.dictionaries(st.integers(-(2**63), 2**63 - 1), st.builds(FramePictures, st.binary(), st.binary())))
 def test_what_is_written_is_read(tmp_path_factory, pictures):
     path = tmp_path_factory.mktemp("kept") / "pictures.npz"
-    write_pictures(path, LogPictures(TRACK, pictures))
+    write_pictures(path, LogPictures(TRACK, pictures, PICTURES.faults))
     found = read_pictures(path)
     assert found.frames == pictures
+    assert found.faults == read_faults(path) == PICTURES.faults
     for name, value in vars(TRACK).items():
         np.testing.assert_array_equal(getattr(found.track, name), value)
 
 
 def test_equal_pictures_give_equal_bytes_whatever_their_order(tmp_path):
-    write_pictures(tmp_path / "a", PICTURES)
-    write_pictures(tmp_path / "b", LogPictures(TRACK, dict(reversed(FRAMES.items()))))
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+    write_pictures(tmp_path / "a" / "key", PICTURES)
+    write_pictures(tmp_path / "b" / "key", LogPictures(TRACK, dict(reversed(FRAMES.items())), PICTURES.faults))
+    assert (tmp_path / "a" / "key").read_bytes() == (tmp_path / "b" / "key").read_bytes()
 
 
 def of(camera, **changes):
@@ -68,13 +81,14 @@ def test_logs_cameras_and_integrators_have_files_of_their_own(tmp_path):
         ("projection", np.zeros((3, 3)), "projection: has shape (3, 3)"),
         ("start_ns", np.array([1, 2]), "start_ns: has shape (2,), type int64"),
         ("stamps_ns", np.array([1, 2]), "2 frames have 3 images and 3 labels"),
+        ("faults", np.array([1]), "faults: has shape (1,), type int64"),
         ("stamps_ns", np.array([[1, 2, 3]]), "stamps_ns: has shape (1, 3), type int64"),
     ],
 )
 def test_files_that_contradict_themselves_are_refused(tmp_path, name, value, message):
     write_pictures(tmp_path / "kept", PICTURES)
     arrays = read_arrays(tmp_path / "kept", NAMES)
-    write_arrays(tmp_path / "kept", {**arrays, name: value})
+    write_arrays(tmp_path / "kept", {**arrays, name: value}, owner="kept")
     with pytest.raises(ResultError, match=re.escape(message)):
         read_pictures(tmp_path / "kept")
 
@@ -94,5 +108,9 @@ def test_a_missing_or_damaged_file_is_told(tmp_path):
         read_pictures(tmp_path / "none")
     write_pictures(tmp_path / "kept", PICTURES)
     (tmp_path / "kept").write_bytes((tmp_path / "kept").read_bytes()[:80])
-    with pytest.raises(ResultError, match="cannot be read"):
+    with pytest.raises(ResultError, match="is damaged"):
         read_pictures(tmp_path / "kept")
+    write_pictures(tmp_path / "kept", PICTURES)
+    (tmp_path / "kept").rename(tmp_path / "another")
+    with pytest.raises(ResultError, match=r"belongs to another id \(kept, not another\)"):
+        read_faults(tmp_path / "another")

@@ -14,6 +14,7 @@ from semgrid_eval.report.rows.load import Result, Row
 from semgrid_eval.scores import results
 from semgrid_eval.scores.metrics.metric import ScoredWindows
 from semgrid_eval.scores.metrics.table import count_windows
+from semgrid_eval.seals import open_seal, write_sealed
 
 SIDE = 128
 FRAME_NS = 58_823_529
@@ -220,7 +221,7 @@ class _Maker:
             inputs = self._inputs(row)
             windows_id = digest_value([row.what, len(self.records), self.names])
             arrays = {"inputs": inputs, "target": self.target, "mask": self.mask}
-            results.write_arrays(results.windows_file(self.run, windows_id), arrays)
+            results.write_arrays(results.windows_file(self.run, windows_id), arrays, owner=windows_id)
             ids = tuple(self._result(row, seed, inputs, windows_id) for seed in range(max(1, row.seeds)))
         return results.RowRecord(
             facts=row.facts,
@@ -251,11 +252,12 @@ class _Maker:
         trained = row.seeds > 0
         result_id = digest_value([row.name, row.config, seed, self.names])
         folder = results.result_folder(self.run, result_id)
-        results.write_arrays(folder / "predictions.npz", {"prediction": prediction, "certainty": certainty})
+        arrays = {"prediction": prediction, "certainty": certainty}
+        results.write_arrays(folder / "predictions.npz", arrays, owner=result_id)
         scored = ScoredWindows(self.target, prediction, certainty, self.mask, inputs, self.actors, GridSpec())
         results.write_sums(folder, count_windows(scored))
         if trained:
-            (folder / "history.csv").write_text(_history(seed, row.wrong))
+            write_sealed(folder / "history.csv", f"{_history(seed, row.wrong)}# {open_seal(result_id)}\n".encode())
         record = results.ResultRecord(
             format_version=results.FORMAT_VERSION,
             id=result_id,

@@ -1,6 +1,6 @@
 """Curves with their tables: shares of right cells by certainty, and losses of trainings over epochs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, StrMethodFormatter
 
 from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
 from semgrid_eval.report.figures.style import INK, SETTINGS, Plot, finish, line_style, short
-from semgrid_eval.report.rows.load import Row
+from semgrid_eval.report.rows.load import Result, Row
 from semgrid_eval.scores.metrics.table import CALIBRATION
 
 _CAPTION = (
@@ -56,7 +56,8 @@ def calibration_plots(scores: Scores) -> list[Plot]:
         return [finish(figure, "calibration", "calibration.csv", _CAPTION)]
 
 
-HISTORY_COLUMNS = ("epoch", "updates", "learning_rate", "loss", "validation_loss", "seconds")
+HISTORY_COLUMNS = ("epoch", "updates", "learning_rate", "loss", "validation_loss")
+TIMING_COLUMNS = ("row", "seed", "of", "epoch", "seconds")
 
 
 def training_frame(rows: Sequence[Row]) -> pd.DataFrame:
@@ -69,6 +70,29 @@ def training_frame(rows: Sequence[Row]) -> pd.DataFrame:
         if result.history is not None
     ]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
+
+
+def timing_frame(rows: Sequence[Row]) -> pd.DataFrame:
+    """Return all that was measured with a clock and differs from one start to the next: `TIMING_COLUMNS`.
+
+    Seconds are `of` an epoch, of a whole training, and of the prediction of all windows of a result.
+    """
+    lines = [
+        (row.name, result.record.seed, *measured)
+        for row in rows
+        for result in row.results
+        for measured in _times(result)
+    ]
+    return pd.DataFrame(lines, columns=list(TIMING_COLUMNS)).astype({"seed": "Int64", "epoch": "Int64"})
+
+
+def _times(result: Result) -> Iterator[tuple[str, int | None, float]]:
+    if result.history is not None:
+        for epoch, seconds in zip(result.history["epoch"], result.history["seconds"], strict=True):
+            yield "epoch", int(epoch), float(seconds)
+    if result.record.train_seconds is not None:
+        yield "training", None, result.record.train_seconds
+    yield "prediction", None, result.record.predict_seconds
 
 
 def training_plots(rows: Sequence[Row]) -> list[Plot]:

@@ -15,7 +15,7 @@ from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
 from semgrid_eval.report.figures.style import INK, PALETTE, SETTINGS, Plot, evidence, finish, short
 from semgrid_eval.report.rows.pairing import HEADLINE, settings_of
 
-COLUMNS = ("figure", "row", "setting", "value", "by", "by_value", "parameters", "iou", "low", "high", "window_ms")
+COLUMNS = ("figure", "row", "setting", "value", "by", "by_value", "parameters", "iou", "low", "high")
 _ASIDE = 0.02  # of the axis: how far lines stand apart, so that their intervals can be told apart
 _MOST_SETS = 4
 _LEFT_OUT = "horizon_steps"  # scores over the lead time have a figure of their own
@@ -48,7 +48,7 @@ def settings_frame(scores: Scores) -> pd.DataFrame:
         for entry in varied.rows:
             iou, parameters = entry.estimate(HEADLINE), entry.row.results[0].record.parameters
             values = (setting, varied.value(entry), by, varied.value(entry, 1), parameters)
-            lines.append((_name(index), entry.row.name, *values, iou.value, iou.low, iou.high, _window_ms(entry)))
+            lines.append((_name(index), entry.row.name, *values, iou.value, iou.low, iou.high))
     return pd.DataFrame(lines, columns=list(COLUMNS)).astype({"parameters": "Int64"})
 
 
@@ -118,7 +118,7 @@ def _caption(varied: Varied) -> str:
     return (
         f"Rows that differ in {' and '.join(varied.keys)} alone: score with 95% interval, time of a window's "
         f"prediction, and both, where numbers are {_word(varied.keys[0])} and the dashed line joins the rows that "
-        f"none beats in both ({rows})."
+        f"none beats in both ({rows}). Times stand in timings.csv."
     )
 
 

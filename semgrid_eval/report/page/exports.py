@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,7 +25,7 @@ from semgrid_eval.report.estimates.bootstrap import (
 )
 from semgrid_eval.report.estimates.paces import divisions
 from semgrid_eval.report.figures import categories, curves, settings
-from semgrid_eval.report.figures.curves import calibration_frame, training_frame
+from semgrid_eval.report.figures.curves import calibration_frame, timing_frame, training_frame
 from semgrid_eval.report.figures.settings import settings_frame
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
@@ -40,7 +41,9 @@ from semgrid_eval.report.tables.values import reference_scores
 from semgrid_eval.scores.metrics.metric import column_names
 from semgrid_eval.scores.tidy import FIGURE_COLUMNS
 
-RECORD = "report.json"
+PAGE, RECORD = "index.html", "report.json"
+FILES = "files"
+"""The key in report.json of the names of all files of the report."""
 FORMAT_VERSION = 3
 FORMATS: Mapping[str, Callable[[Table], str]] = {"csv": as_csv, "json": as_json, "md": as_markdown, "tex": as_latex}
 """By the ends of files' names; to add a format, add a line here."""
@@ -73,6 +76,11 @@ class Material:
         """The IoU of all cells."""
         return everywhere(self.everything, "iou")
 
+    @cached_property
+    def records(self) -> Records:
+        """What machines may want to know."""
+        return division_records(self.everything)
+
 
 def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
     """Work out everything that a report shows."""
@@ -92,8 +100,8 @@ def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
 
 
 def write_numbers(folder: Path, material: Material) -> None:
-    """Write the long tables as CSV, each run's matrix and report.json."""
-    runs, records = material.runs, division_records(material.everything)
+    """Write the long tables as CSV, and each run's matrix."""
+    runs, records = material.runs, material.records
     frames = {
         "summary": summary_frame(records),
         "scores": seed_frame(material.everything),
@@ -101,13 +109,20 @@ def write_numbers(folder: Path, material: Material) -> None:
         "calibration": calibration_frame(everywhere(material.everything, "calibration")),
         "settings": settings_frame(material.scores),
         "training": training_frame([row for run in runs for row in run.rows]),
+        "timings": timing_frame([row for run in runs for row in run.rows]),
         "windows": window_frame(runs),
     }
     for name, frame in frames.items():
         write_text(folder / f"{name}.csv", frame_csv(frame))
     for run in runs:
         write_text(folder / matrix_file(run, runs), matrix_text(run))
-    write_json(folder / RECORD, report_record(material, records))
+
+
+def write_record(folder: Path, material: Material) -> None:
+    """Write report.json when all else is written, and list there what that is."""
+    files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+    record = report_record(material, material.records)
+    write_json(folder / RECORD, record | {FILES: [*files, RECORD]})
 
 
 def write_tables(folder: Path, material: Material) -> None:

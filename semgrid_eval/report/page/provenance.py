@@ -34,6 +34,9 @@ def failures(runs: Sequence[Run]) -> list[Failure]:
     for run in runs:
         found += [Failure("row", row.name, reason) for row in run.rows for reason in row.failures]
         found += [Failure("log", *reason) for reason in sorted(run.record.failed_logs.items())]
+        tag = f" ({run.tag})" if run.tag else ""
+        found += [Failure(fault.kind, f"{fault.name}{tag}", fault.reason) for fault in run.faults]
+        found += [Failure("picture", *text.split(": ", 1)) for text in run.damaged_pictures]
     return found
 
 
@@ -67,6 +70,8 @@ def _data_set(name: str, logs: Sequence[LogRecord]) -> str:
     splits = Counter(log.split for log in logs)
     shares = " and ".join(f"{plural(count, 'log')} of {split}" for split, count in sorted(splits.items()))
     text = f"{name}: {shares}; digest {digest}"
+    if unsummed := sum(not log.checksums for log in logs):
+        text += f"; {unsummed} of {len(logs)} without checksums, so that damage to them cannot be seen"
     published = published_fingerprints(name)
     # A log to train on and to score is there twice.
     known = {log.digest: (log.fingerprint or "")[:FINGERPRINT_CHARACTERS] for log in logs}
@@ -126,9 +131,12 @@ def _state(row: Row) -> str:
 def log_table(runs: Sequence[Run]) -> Table:
     """List the logs by their paths, which example windows name, too, with their digests."""
     logs = {(log.path, log.digest): log for run in runs for log in run.record.logs}
-    lines = [Line(log.path, (Cell(log.dataset), Cell(log.split), Cell(log.digest))) for log in logs.values()]
+    lines = [
+        Line(log.path, (Cell(log.dataset), Cell(log.split), Cell(log.digest), Cell("yes" if log.checksums else "none")))
+        for log in logs.values()
+    ]
     caption = "Logs that took part, by their paths below the folder of logs"
-    return plain_table("logs", caption, "Log", ("Data set", "Split", "Digest"), lines)
+    return plain_table("logs", caption, "Log", ("Data set", "Split", "Digest", "Checksums"), lines)
 
 
 def result_table(runs: Sequence[Run]) -> Table:

@@ -1,6 +1,6 @@
 """Writes a report: the page with its head in a few sentences and large figures, and what lies beside it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from math import isfinite
@@ -10,8 +10,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from semgrid_eval import __version__
-from semgrid_eval.errors import InputError
-from semgrid_eval.files import atomic_folder
+from semgrid_eval.errors import InputError, printable
+from semgrid_eval.files import atomic_folder, locked
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.report.claims.claims import MARGIN, in_paper
 from semgrid_eval.report.claims.findings import Finding, finding_table, missing_table, sentence
@@ -20,13 +20,13 @@ from semgrid_eval.report.estimates.paces import EDGES_MPS
 from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, class_style, data_uri
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
 from semgrid_eval.report.page import exports, provenance
-from semgrid_eval.report.page.exports import Material, gather
+from semgrid_eval.report.page.exports import PAGE, Material, gather
+from semgrid_eval.report.page.replace import check_replaceable, keep_foreign
 from semgrid_eval.report.rows.load import Row, Run, key_of, load_runs
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, Headline, headline, verdict
 from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, plural, signed
 from semgrid_eval.report.tables.scores import confusion_table
 
-PAGE = "index.html"
 _SEED = 20190623  # any number does; a fixed one gives the same run the same intervals
 _FEW_RECORDINGS, _FEW_SEEDS = 10, 5
 _WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
@@ -57,15 +57,22 @@ class Summary:
 
 
 def write_report(
-    run: Path | Sequence[Path], out: Path | None = None, *, resample: Level = "recordings", progress: Progress = silent
+    run: Path | Sequence[Path],
+    out: Path | None = None,
+    *,
+    resample: Level = "recordings",
+    progress: Progress = silent,
+    damaged: Callable[[str], object] = len,
 ) -> Path:
     """Write the report of one run, or of several side by side, and return its page.
 
     Args:
         run: the folder of a run, or several.
-        out: the folder to write; `report` in the (first) run where it is not given. A report there is replaced.
+        out: the folder to write; `report` in the (first) run where it is not given. A report there is replaced in one
+            step, files in it that are not the report's stay, and others that write there at the same time wait.
         resample: what is resampled first: recordings, or groups of them (towns, cities, drives).
         progress: told of each row read.
+        damaged: told of each file of a run that is damaged, lost or another's, in one line; the page says it, too.
 
     Raises:
         InputError: a run's record cannot be read, or `out` holds something other than a report.
@@ -74,13 +81,20 @@ def write_report(
     if not folders:
         raise InputError("no run is given", field="run")
     out = folders[0] / "report" if out is None else out
-    _check_replaceable(out)
+    check_replaceable(out)
     material = gather(load_runs(folders, progress=progress), Resampling(_SEED, level=resample))
-    with atomic_folder(out) as folder:
-        exports.write_numbers(folder, material)
-        exports.write_tables(folder, material)
-        exports.write_figures(folder, material.figures)
-        (folder / PAGE).write_text(render_page(material), encoding="utf-8")
+    with locked(out.parent, f".{out.name}.lock"):
+        check_replaceable(out)
+        with atomic_folder(out) as folder:
+            exports.write_numbers(folder, material)
+            exports.write_tables(folder, material)
+            exports.write_figures(folder, material.figures)
+            (folder / PAGE).write_text(render_page(material), encoding="utf-8")
+            exports.write_record(folder, material)
+            keep_foreign(out, folder)
+    for each in material.runs:
+        for fault in each.damages:
+            damaged(f"{fault.kind} {fault.name}: {fault.reason}")
     return out / PAGE
 
 
@@ -92,7 +106,9 @@ def render_page(material: Material) -> str:
     examples = example_groups(runs, rows, found)
     shown = () if found is None else filter(None, (found.best, found.reference or found.rival))
     loader, strict = PackageLoader("semgrid_eval.report"), StrictUndefined
-    environment = Environment(loader=loader, autoescape=True, undefined=strict, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=strict, trim_blocks=True, lstrip_blocks=True, finalize=_shown
+    )
     environment.filters["svg_uri"] = lambda text: data_uri(text.encode(), "image/svg+xml")
     return environment.get_template("page.html.j2").render(
         style=Markup(class_style()) + _source("style.css") + _source("examples.css"),
@@ -137,12 +153,11 @@ def finding_view(tag: str, index: int, findings: Sequence[Finding]) -> dict[str,
     return {"tag": tag, "sentence": sentence(mine), "tested": tested, "missing": missing}
 
 
-def _check_replaceable(out: Path) -> None:
-    if not out.exists():
-        return
-    is_report = (out / exports.RECORD).is_file() and (out / PAGE).is_file()
-    if not out.is_dir() or (any(out.iterdir()) and not is_report):
-        raise InputError("exists and is not a report; name another folder", path=out, field="out")
+def _shown(value: object) -> object:
+    """Escape what cannot be printed in names, wherever they come from; texts of several lines keep them."""
+    if isinstance(value, Markup) or not isinstance(value, str):
+        return value
+    return "\n".join(map(printable, value.split("\n")))
 
 
 def _source(name: str) -> Markup:

@@ -5,17 +5,19 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from semgrid_eval.config import parse_config
-from semgrid_eval.errors import ConfigError, SemgridError
+from semgrid_eval.errors import ConfigError, ResultError, SemgridError, first_line
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores import results as files
+from semgrid_eval.scores.thumbnails import PICTURES, read_faults
+from semgrid_eval.seals import read_sealed
 
 WindowReader = Callable[[Path, str], Mapping[str, NDArray[Any]]]
 """Reads a set of windows, as `scores.results.read_windows` does, from a run by its id."""
@@ -72,6 +74,7 @@ class Row:
     failures: tuple[str, ...]
     run: Path
     groups: Mapping[str, str] = field(default_factory=dict)  # by a log's path
+    faults: tuple[str, ...] = ()  # those of the failures that are faults of its files
 
     @property
     def is_left(self) -> bool:
@@ -127,6 +130,14 @@ class Row:
         return tuple(1000 * result.record.predict_seconds / self.windows for result in self.results)
 
 
+class Fault(NamedTuple):
+    """Something in a run's folder that is damaged, lost or belongs elsewhere: its kind, its name and what is wrong."""
+
+    kind: str
+    name: str
+    reason: str
+
+
 @dataclass(frozen=True)
 class Run:
     """A whole run as read from disk."""
@@ -135,6 +146,13 @@ class Run:
     tag: str  # tells runs apart; empty where there is only one
     record: files.RunRecord
     rows: tuple[Row, ...]
+    faults: tuple[Fault, ...] = ()  # of files besides those of the rows' scores
+    damaged_pictures: tuple[str, ...] = ()  # of logs, as the run found them
+
+    @property
+    def damages(self) -> tuple[Fault, ...]:
+        """All that is wrong with the run's files."""
+        return (*(Fault("row", row.name, reason) for row in self.rows for reason in row.faults), *self.faults)
 
 
 def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[Run, ...]:
@@ -150,8 +168,33 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
         for row in record.rows:
             rows.append(load.row(row, f"{row.name} ({tag})" if tag else row.name))
             progress(next(done), total, row.name)
-        runs.append(Run(folder, tag, record, tuple(rows)))
+        runs.append(Run(folder, tag, record, tuple(rows), *_besides_scores(folder, rows)))
     return tuple(runs)
+
+
+def _besides_scores(run: Path, rows: Sequence[Row]) -> tuple[tuple[Fault, ...], tuple[str, ...]]:
+    """Look at what a report's examples are made from: what is wrong with its files, and what a run found in logs."""
+    results = [result for row in rows for result in row.results]
+    asked = {files.windows_file(run, result.record.windows_id): "windows" for result in results}
+    predictions = (result.folder / files.PREDICTIONS_FILE for result in results)
+    asked |= {path: "predictions" for path in predictions if path.exists()}
+    faults, said = [], list[str]()
+    for path, kind in asked.items():
+        owner = path.stem if kind == "windows" else path.parent.name
+        try:
+            read_sealed(path, owner)
+        except ResultError as error:
+            faults.append(_fault(kind, path, error, run))
+    for path in sorted((run / PICTURES).glob("*.npz")):
+        try:
+            said += read_faults(path)
+        except ResultError as error:
+            faults.append(_fault("pictures", path, error, run))
+    return tuple(faults), tuple(said)
+
+
+def _fault(kind: str, path: Path, error: ResultError, run: Path) -> Fault:
+    return Fault(kind, str(path.relative_to(run)), str(error).removeprefix(f"{path}: "))
 
 
 def comparable(row: Row, other: Row) -> bool:
@@ -189,21 +232,22 @@ class _Loader:
 
     def row(self, row: files.RowRecord, name: str) -> Row:
         failures = [] if row.failure in (None, files.NOT_RUN) else [row.failure]
-        found = []
+        found, faults = [], []
         for result_id in row.results:
             try:
                 found.append(self._result(files.result_folder(self._run, result_id)))
             except (SemgridError, OSError, ValueError) as error:
-                failures.append(str(error))
+                faults.append(first_line(error))
+        failures += faults
         if not row.results and row.failure is None:
             failures.append("it has no result")
         if found and not any(result.record.windows for result in found):
             failures.append("it has no window to score")
-        return Row(name, row, tuple(found), tuple(failures), self._run, self._groups)
+        return Row(name, row, tuple(found), tuple(failures), self._run, self._groups, tuple(faults))
 
     def _result(self, folder: Path) -> Result:
         record = files.read_result(folder)
         windows = self._windows.setdefault(record.windows, record.windows)
         files.check_sums(folder, len(windows))
         shared = record.model_copy(update={"windows": windows})
-        return Result(shared, partial(files.read_sums, folder), files.read_history(folder), folder)
+        return Result(shared, partial(files.read_sums, folder, verify=False), files.read_history(folder), folder)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from semgrid_eval.errors import printable
 from semgrid_eval.report.estimates.bootstrap import Estimate
 from semgrid_eval.report.rows.pairing import verdict
 from semgrid_eval.report.tables.numbers import finite, interval, number, signed
@@ -67,8 +68,8 @@ def _bounds(estimate: Estimate) -> tuple[float, float] | None:
 
 
 def one_line(text: str) -> str:
-    """Turn what ends a line, or cannot be printed, into spaces."""
-    return " ".join("".join(character if character.isprintable() else " " for character in text).split())
+    """Turn what ends a line into spaces, and escape what cannot be printed."""
+    return printable(" ".join(text.split()))
 
 
 def heads(table: Table) -> list[str]:

@@ -13,7 +13,9 @@ import numpy as np
 
 from semgrid_eval.classes import CITYSCAPES_LABELS, label_ids_from_train_ids
 from semgrid_eval.errors import InputError
-from semgrid_eval.recording.png import GRAY, PALETTE, PngHeader, decode_ids, encode_gray, read_header
+from semgrid_eval.files import read_bytes
+from semgrid_eval.motion import implausible
+from semgrid_eval.recording.png import GRAY, PALETTE, PngHeader, decode_ids, encode_gray, require_pixels
 from semgrid_eval.recording.types import CameraCalibration, MotionSample
 
 MAX_FILE_BYTES = 1 << 28
@@ -29,14 +31,9 @@ _GPS_FIELDS = {"latitude_deg": "gpsLatitude", "longitude_deg": "gpsLongitude", "
 
 def read_file(path: Path) -> bytes:
     """Read a whole file of at most 256 MiB."""
-    try:
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise InputError(f"is larger than {MAX_FILE_BYTES >> 20} MiB", path=path)
-        return path.read_bytes()
-    except FileNotFoundError as error:
-        raise InputError("is missing", path=path) from error
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}", path=path) from error
+    if not path.exists():
+        raise InputError("is missing", path=path)
+    return read_bytes(path, limit=MAX_FILE_BYTES)
 
 
 def read_camera(path: Path) -> CameraCalibration:
@@ -57,7 +54,10 @@ def read_vehicle(path: Path, stamp_ns: int) -> MotionSample:
     motion = {name: _number(content, path, field) for name, field in _MOTION_FIELDS.items()}
     given = {name: field for name, field in _GPS_FIELDS.items() if content.get(field) is not None}
     gps = {name: _number(content, path, field) for name, field in given.items()}
-    return MotionSample(stamp_ns=stamp_ns, **motion, **gps)
+    sample = MotionSample(stamp_ns=stamp_ns, **motion, **gps)
+    if fault := implausible(sample):
+        raise InputError(fault[1], path=path, field=_MOTION_FIELDS[fault[0]])
+    return sample
 
 
 def read_stamp(path: Path) -> int:
@@ -72,7 +72,7 @@ def read_stamp(path: Path) -> int:
 def read_picture(path: Path, bit_depth: int, *, gray: bool) -> tuple[bytes, PngHeader]:
     """Read a PNG file of a bit depth undecoded, with its header."""
     data = read_file(path)
-    header = read_header(data, path)
+    header = require_pixels(data, path)
     if header.bit_depth != bit_depth or (gray and header.colour_type != GRAY):
         raise InputError(f"is {header}; {bit_depth} bit{' gray' if gray else ''} is needed", path=path)
     return data, header
@@ -81,7 +81,7 @@ def read_picture(path: Path, bit_depth: int, *, gray: bool) -> tuple[bytes, PngH
 def read_label(path: Path, *, train_ids: bool) -> tuple[bytes, PngHeader]:
     """Read a label image as an 8-bit PNG file of label ids, gray or palette; label ids of 8 bits stay undecoded."""
     data = read_file(path)
-    header = read_header(data, path)
+    header = require_pixels(data, path)
     if header.bit_depth == 8 and header.colour_type in (GRAY, PALETTE) and not train_ids:
         return data, header
     ids = decode_ids(data, path)

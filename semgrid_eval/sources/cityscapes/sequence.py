@@ -71,7 +71,8 @@ class CityscapesSequence:
         self._require_files()
         options = [_CONVERSION_VERSION, self.name, self.split, self.camera_name, self.train_ids]
         names = [[path.name for path in frame.present()] for frame in self.frames]
-        content = digest_files(path for frame in self.frames for path in frame.present())
+        present = (path for frame in self.frames for path in frame.present())
+        content = digest_files(present, limit=files.MAX_FILE_BYTES)
         return digest_value([options, names, content])
 
     @property

@@ -134,6 +134,7 @@ def render_recording(plan: RecordingPlan) -> Recording:
         group=plan.name.partition("_")[0],  # the town: town03
         calibrations={CAMERA_NAME: plan.conditions.calibration},
         source_digest=plan.digest,
+        encoded_here=True,
         moments=partial(_moments, plan),
         source_files={"plan.json": description.encode()},
         conditions=plan.drawn.quantities(plan.stereo) if plan.drawn else {},

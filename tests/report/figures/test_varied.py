@@ -79,4 +79,4 @@ def test_the_table_holds_what_the_figure_shows(row):
     assert table.by_value.tolist() == [16, 16, 32]
     assert (table.low <= table.iou).all()
     assert table.iou[0] == scores[table.row[0]].mean["mean_known"]
-    assert table.window_ms[0] == 1000 * 1.25 / row.windows
+    assert not [name for name in table.columns if "ms" in name or "seconds" in name]

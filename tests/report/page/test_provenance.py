@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from semgrid_eval.report.page.provenance import command_table, data_sets, duration, matrix_file, matrix_text
+from semgrid_eval.report.page.provenance import command_table, data_sets, duration, log_table, matrix_file, matrix_text
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.scores.results import read_run
@@ -80,3 +80,12 @@ def test_the_matrix_lies_beside_the_page(page):
 @pytest.mark.parametrize(("seconds", "text"), [(9.94, "9.9 s"), (312.5, "5 min 12 s"), (7260, "2 h 1 min")])
 def test_durations_are_short(seconds, text):
     assert duration(seconds) == text
+
+
+def test_logs_without_checksums_are_told(run):
+    logs = read_run(run).logs
+    (text,) = data_sets(with_logs(run, (logs[0].model_copy(update={"checksums": False}), *logs[1:])))
+    assert "; 1 of 8 without checksums, so that damage to them cannot be seen" in text
+    (found,) = load_runs([run])
+    found = replace(found, record=with_logs(run, (logs[0].model_copy(update={"checksums": False}), *logs[1:])))
+    assert [body[0].cells[-1].text for body in log_table([found]).bodies] == ["none", *["yes"] * 7]

@@ -1,4 +1,5 @@
 import filecmp
+import json
 import os
 import re
 import subprocess
@@ -13,6 +14,7 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import read_json
 from semgrid_eval.report.page.write import write_report
+from semgrid_eval.scores.results import read_run, write_run
 
 VOID = {"meta", "link", "img", "input", "br"}
 
@@ -192,16 +194,19 @@ def lonely(tmp_path_factory):
         tmp_path_factory.mktemp("runs") / "run", rows=(FakeRow("DC", "BL"),), recordings=1, windows=1, truth=False
     )
     old = run / "report"
-    old.mkdir()
-    for name in ("report.json", "index.html", "old.txt"):
+    (old / "notes").mkdir(parents=True)
+    for name in ("index.html", "old.csv"):
         (old / name).touch()
+    (old / "report.json").write_text(json.dumps({"files": ["old.csv"]}))
+    (old / "notes" / "mine.txt").write_text("precious")
     return write_report(run)
 
 
-def test_an_old_report_in_the_default_place_is_replaced(lonely):
+def test_an_old_report_in_the_default_place_is_replaced_and_what_is_not_its_own_stays(lonely):
     assert lonely.parent.name == "report"
     assert (lonely.parent.parent / "run.json").is_file()
-    assert not (lonely.parent / "old.txt").exists()
+    assert not (lonely.parent / "old.csv").exists()
+    assert (lonely.parent / "notes" / "mine.txt").read_text() == "precious"
 
 
 def test_one_row_only(lonely):
@@ -273,3 +278,17 @@ def test_runs_with_different_windows_are_not_subtracted_and_the_page_says_why(tm
     assert "ED-DC (part) \N{MINUS SIGN} BL-DC (part)" in text
     assert "(part) \N{MINUS SIGN} ED-DC (whole)" not in text
     assert "BL-DC (part), ED-DC (part) the logs or their frames (against BL-DC (whole)) 4 4 shared" in text
+
+
+def test_names_that_would_move_a_cursor_are_escaped_on_the_page_and_in_its_files(tmp_path):
+    run = make_fake_run(tmp_path / "run", rows=(FakeRow("DC", "BL"),), recordings=2, windows=1)
+    record, odd = read_run(run), "\x1b[31m\u202ered"
+    (row,) = record.rows
+    rows = (row.model_copy(update={"name": odd, "label": odd}),)
+    write_run(run, record.model_copy(update={"title": odd, "rows": rows, "failed_logs": {odd: odd}}))
+    page = write_report(run)
+    for path in (page, *page.parent.rglob("*.csv"), *page.parent.rglob("*.md"), *page.parent.rglob("*.json")):
+        text = path.read_text()
+        assert "\x1b" not in text, path
+        assert "\u202e" not in text, path
+    assert "\\x1b[31m\\u202ered" in page.read_text()

@@ -67,6 +67,17 @@ def test_training_histories_are_one_table(page):
     assert {"epoch", "loss", "validation_loss"} <= set(table.columns)
 
 
+def test_what_a_clock_measured_stands_apart_from_what_comes_out_the_same_again(page):
+    timings = pd.read_csv(page.parent / "timings.csv")
+    assert timings.groupby(["row", "of"]).size()["ED-DC"].to_dict() == {"epoch": 18, "prediction": 3, "training": 3}
+    assert timings[(timings.row == "ED-DC") & (timings.of == "training")].seconds.tolist() == [80.0, 81.0, 82.0]
+    assert timings[timings.of == "prediction"].seconds.eq(1.25).all()
+    for path in page.parent.glob("*.csv"):
+        if path.name != "timings.csv":
+            columns = pd.read_csv(path).columns
+            assert not [name for name in columns if "seconds" in name or name.endswith("_ms")], path.name
+
+
 def test_findings_and_regions_are_there_for_machines(page):
     record = read_json(page.parent / "report.json")
     finding = next(each for each in record["findings"] if each["name"] == "moving-BL-DC")

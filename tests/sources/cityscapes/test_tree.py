@@ -1,5 +1,8 @@
 import json
+import os
 import pickle
+import struct
+import zlib
 
 import cv2
 import numpy as np
@@ -321,3 +324,29 @@ def test_tree_without_sequences_split_or_labels_is_refused(tree, tmp_path):
         sequences(tree, labels=tmp_path / "labels")
     with pytest.raises(InputError, match="camera name: 'a/b' is not a name"):
         sequences(tree, camera_name="a/b")
+
+
+@pytest.mark.parametrize("channel", ["vehicle", "image", "disparity"])
+def test_a_file_of_a_tebibyte_is_refused_before_it_is_read(tree, channel):
+    (name,) = tree.write([0])
+    path = getattr(tree, channel)(name)
+    os.truncate(path, 1 << 40)
+    assert fault(tree) == f"{path}: has 1048576 MiB, and 256 are allowed"
+
+
+def test_speed_that_no_vehicle_has_names_file_and_field(tree):
+    names = tree.write(range(2))
+    change_json(tree.vehicle(names[1]), lambda value: value.update(speed=1e6))
+    assert fault(tree) == f"{tree.vehicle(names[1])}: speed: 1e+06 m/s is not within -15 to 70"
+
+
+def test_an_image_without_all_its_pixels_is_named(tree):
+    (name,) = tree.write([0])
+    whole = tree.disparity(name).read_bytes()
+    start = whole.index(b"IDAT") - 4
+    body = whole[start + 8 : whole.index(b"IEND") - 8][:-6]
+    chunk = b"IDAT" + body
+    tree.disparity(name).write_bytes(
+        whole[:start] + struct.pack(">I", len(body)) + chunk + struct.pack(">I", zlib.crc32(chunk)) + whole[-12:]
+    )
+    assert fault(tree).startswith(f"{tree.disparity(name)}: is a damaged PNG file: ")

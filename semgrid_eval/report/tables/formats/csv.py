@@ -2,7 +2,10 @@
 
 import pandas as pd
 
+from semgrid_eval.errors import printable
 from semgrid_eval.report.tables.table import Cell, Table, heads, lines
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def as_csv(table: Table) -> str:
@@ -20,8 +23,29 @@ def as_csv(table: Table) -> str:
 
 
 def frame_csv(frame: pd.DataFrame) -> str:
-    """Write a data frame as all CSV files of a report are written."""
-    return frame.to_csv(index=False, float_format="%.6f", lineterminator="\n")
+    """Write a data frame as all CSV files of a report are written.
+
+    Words that a spreadsheet would take for a formula have an apostrophe before them, as in spreadsheets themselves, and
+    what cannot be printed is escaped.
+    """
+    words = {name: frame[name].map(_word) for name in frame.columns if frame[name].dtype.kind in "OTU"}
+    safe = frame.assign(**{str(name): column for name, column in words.items()}).rename(columns=_word)
+    return safe.to_csv(index=False, float_format="%.6f", lineterminator="\n")
+
+
+def _word(value: object) -> object:
+    if not isinstance(value, str):
+        return value
+    text = printable(value)
+    return f"'{text}" if value.startswith(_FORMULA) and not _is_number(text) else text
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _values(cell: Cell, *, has_interval: bool) -> list[object]:

@@ -17,4 +17,4 @@ def _cell(cell: Cell) -> str:
 
 
 def _escaped(text: str) -> str:
-    return one_line("".join(f"\\{character}" if character in "\\`*_{}[]<>#|!&$~" else character for character in text))
+    return "".join(f"\\{each}" if each in "\\`*_{}[]<>#|!&$~" else each for each in one_line(text))

@@ -10,7 +10,7 @@ from support.fake_run import HOSTILE
 from support.scoring import score_rows
 
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables.formats.csv import as_csv
+from semgrid_eval.report.tables.formats.csv import as_csv, frame_csv
 from semgrid_eval.report.tables.formats.json import as_json
 from semgrid_eval.report.tables.formats.latex import as_latex
 from semgrid_eval.report.tables.formats.markdown import as_markdown
@@ -92,3 +92,26 @@ def test_columns_of_several_regions_are_told_apart():
     columns = (("Car", "moving, 2,164 cells"), ("Car", "standing, 7 cells"))
     table = Table("", "", "Row", columns, ((Line("a", (Cell("1", 1.0), Cell("2", 2.0))),),))
     assert as_csv(table).splitlines()[0] == "Row,Car (moving),Car (standing)"
+
+
+@pytest.mark.parametrize("name", ["=1+2", "+1 row", "-row", "@sum", "\t=1", "\r=1", "=HYPERLINK(1)"])
+def test_no_spreadsheet_takes_a_name_for_a_formula(name):
+    (header, line) = as_csv(named(name)).splitlines()
+    assert header == "Row,Vehicles,Vehicles low,Vehicles high"
+    assert line.startswith("'")
+    column = Table("", "", "Row", ((name, ""),), ((Line("a", (Cell("1", 1.0),)),),))
+    assert as_csv(column).splitlines()[0].startswith("Row,'")
+
+
+def test_numbers_and_plain_words_are_written_as_they_are():
+    frame = pd.DataFrame({"a": ["-0.5", "x=1", "2"], "b": [-1.0, 0.25, None], "c": [1, 2, 3]})
+    assert frame_csv(frame) == "a,b,c\n-0.5,-1.000000,1\nx=1,0.250000,2\n2,,3\n"
+
+
+def test_what_would_move_a_cursor_is_escaped_in_every_format():
+    odd = named("\x1b[31m\u202ered")
+    assert "\\x1b[31m\\u202ered" in as_csv(odd)
+    assert "\\\\x1b\\[31m\\\\u202ered" in as_markdown(odd)
+    for text in (as_csv(odd), as_markdown(odd), as_latex(odd), as_json(odd)):
+        assert "\x1b" not in text
+        assert "\u202e" not in text
