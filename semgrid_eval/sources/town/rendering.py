@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.recording.types import Actor, Moment, MotionSample, Pose, Recording
+from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town import drives
 from semgrid_eval.sources.town.bodies import actor_ids, boxes_of, heights_m
+from semgrid_eval.sources.town.picture_errors import recording_streams
 from semgrid_eval.sources.town.rig import Rig
 from semgrid_eval.sources.town.sensors import Camera, RayCaster, View, cityscapes_camera, look
 from semgrid_eval.sources.town.shading import Painter, Sunlight, draw_sunlight
@@ -88,7 +90,7 @@ class RecordingPlan:
     seed: tuple[int, ...]  # of the recording's random numbers
     width_px: int  # of the images
     height_px: int  # of the images
-    stereo: str  # `modelled`, `matched`, or `exact` for perfect labels, disparity and motion
+    stereo: Stereo  # `modelled`, `matched`, or `exact` for perfect labels, disparity and motion
     dataset: str = "synthetic"  # named in the log
 
     @property
@@ -123,7 +125,7 @@ def _moments(plan: RecordingPlan) -> Iterator[Moment]:
     town = load_town(plan.town)
     path = drives.ego_path(town.traffic, plan.drive)
     assert path is not None, "a plan's drive was checked when it was chosen"
-    stamps, reports, light, errors = np.random.default_rng(plan.seed).spawn(4)
+    stamps, reports, light, errors = recording_streams(plan.seed)
     times_s = plan.drive.start_s + np.arange(drives.FRAME_COUNT) / drives.FRAME_RATE_HZ
     times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, drives.FRAME_COUNT - 1))
     motion_noise = drives.EXACT_MOTION if plan.stereo == "exact" else drives.MotionNoise()
