@@ -31,7 +31,7 @@ class RunData:
     ) -> None:
         self._folder = logs
         self._logs = find_logs(logs)
-        self._cache, self._executor, self._device, self._stage = cache, executor, device, stage
+        self.cache, self._executor, self._device, self._stage = cache, executor, device, stage
         self._configs = {grid_digest(row.grid): row.grid for row in rows}
         self._sensors = defaultdict[str, list[str]](list)
         for row in rows:
@@ -53,7 +53,7 @@ class RunData:
         if records:
             logs = {record.digest: self._folder / record.path for record in records}
             with self._stage("compare") as progress:
-                found = kept_fingerprints(logs, self._cache, executor=self._executor, progress=progress)
+                found = kept_fingerprints(logs, self.cache, executor=self._executor, progress=progress)
             for record in records:
                 known = record.model_copy(update={"fingerprint": found.get(record.digest)})
                 self.records[record.path] = known
@@ -84,7 +84,7 @@ class RunData:
             with self._stage("grids") as progress:
                 data_set = build_grids(
                     self._logs,
-                    self._cache,
+                    self.cache,
                     config,
                     sensors=self._sensors[key],
                     executor=self._executor,

@@ -1,7 +1,7 @@
 """A row of a matrix: an experiment with everything that determines it; with one seed, it is a unit of a run."""
 
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -9,6 +9,7 @@ from semgrid_eval.config import Config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.grids.truth import Truth
 from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.registry import MODELS, find_model, installed_models, is_named
 from semgrid_eval.scores.evaluate import MaskMode
@@ -39,6 +40,8 @@ class Row(Config):
     repeats: int = Field(1, ge=1, le=1000)  # seeds of a model in which chance plays a part
     train_split: str = "train"
     validation_split: str = "val"
+    # Where the logs to score tell their exact pictures: also score against what is measured on average, see `evaluate`.
+    second_target: Literal["expected"] | None = None
     window: WindowConfig = WindowConfig()
     # Where it differs from `window`, for recordings of another frame rate; what a file leaves out is as in `window`,
     # and the number of inputs has to be.
@@ -84,8 +87,18 @@ class Row(Config):
         return _found(self.model)
 
     def identity(self) -> dict[str, object]:
-        """Return what determines the row's numbers, besides code and logs: all but its name and repeats."""
-        return self.model_dump(mode="json", exclude={"name", "repeats"})
+        """Return what determines the row's numbers, besides code and logs: all but its name and repeats.
+
+        A second target that is not asked for changes no id.
+        """
+        unset = {"second_target"} if self.second_target is None else set()
+        return self.model_dump(mode="json", exclude={"name", "repeats", *unset})
+
+    @property
+    def asked(self) -> Truth | None:
+        """What of the truth its model is told, if anything."""
+        found = self.found_model()
+        return found.asks(found.parse_settings(self.settings), self.given) if found else None
 
     @property
     def facts(self) -> RowFacts:
@@ -101,6 +114,8 @@ class Row(Config):
             horizon_steps=self.scored_window.horizon_steps,
             sensors=self.sensors,
             translate=self.translate,
+            uses_truth=self.asked is not None,
+            bound=found.bound if found else "",
         )
 
     @property

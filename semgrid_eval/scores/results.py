@@ -7,6 +7,8 @@ RUN/results/<id>/sums.npz      int32 arrays METRIC.PARTITION (N, regions, ...): 
                                counted in each window, by the regions of a partition of `scores.regions`; `iou.all` is
                                the confusion matrix (N, 1, C, C), [target, prediction], mask M left out. The partition
                                `actors` is there where a log has the truth
+RUN/results/<id>/expected.npz  where asked for and known: the same, counted against the target that is measured on
+                               average, the likeliest class of each cell over new errors drawn on the exact pictures
 RUN/results/<id>/history.csv   of trained models: epoch, updates, learning_rate, loss, validation_loss, seconds
 RUN/results/<id>/predictions.npz   prediction (N, H, W) uint8 class ids, certainty (N, H, W) uint8 (255 = 1.0)
 RUN/windows/<id>.npz           inputs (N, S, T, H, W) uint8 aligned, target (N, H, W) uint8, mask (N, H, W) bool;
@@ -20,7 +22,7 @@ import re
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -36,6 +38,7 @@ from semgrid_eval.scores.regions.table import PARTITIONS
 FORMAT_VERSION = 2
 RUN_FILE, RESULT_FILE = "run.json", "result.json"
 SUMS_FILE = "sums.npz"
+EXPECTED_FILE = "expected.npz"
 PREDICTIONS_FILE = "predictions.npz"
 HISTORY_FILE = "history.csv"
 NOT_RUN = "not run yet"
@@ -81,6 +84,11 @@ class RowFacts(Config):
     horizon_steps: int  # steps from the newest input to the target
     sensors: tuple[str, ...]  # names of the inputs' sensors
     translate: bool  # whether inputs are moved into the target's place
+    uses_truth: bool = (
+        False  # whether it is told of the truth, so that it is a line beside the others and never the best
+    )
+    # Whether it is an end of the way that others are measured by: what anybody has, or what nobody exceeds.
+    bound: Literal["", "lower", "upper"] = ""
 
 
 class ResultRecord(Config):
@@ -104,6 +112,7 @@ class ResultRecord(Config):
     train_seconds: float | None
     predict_seconds: float
     parameters: int | None
+    has_expected: bool = False  # whether it is also scored against what is measured on average
 
 
 class RowRecord(Config):
@@ -182,7 +191,7 @@ def read_result(folder: Path) -> ResultRecord:
 def is_done(folder: Path, *, with_predictions: bool = False, with_history: bool = False) -> bool:
     """Tell whether a result parses, matches its id, has sums of every metric, and what else is asked for."""
     try:
-        check_sums(folder, len(read_result(folder).windows))
+        check_sums(folder, read_result(folder))
         if with_predictions:
             read_predictions(folder)
         return not with_history or ((history := read_history(folder)) is not None and not history.empty)
@@ -210,26 +219,27 @@ def read_history(folder: Path) -> pd.DataFrame | None:
     return pd.read_csv(path) if path.is_file() else None
 
 
-def write_sums(folder: Path, sums: Sums) -> None:
-    """Write what every metric counted in a result's windows."""
-    write_arrays(folder / SUMS_FILE, {".".join(key): array for key, array in sums.items()})
+def write_sums(folder: Path, sums: Sums, file: str = SUMS_FILE) -> None:
+    """Write what every metric counted in a result's windows; `file` is `EXPECTED_FILE` for that target."""
+    write_arrays(folder / file, {".".join(key): array for key, array in sums.items()})
 
 
-def read_sums(folder: Path, metric: str, partition: str) -> NDArray[np.int32] | None:
+def read_sums(folder: Path, metric: str, partition: str, file: str = SUMS_FILE) -> NDArray[np.int32] | None:
     """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions."""
-    return _read_sums(folder, [(metric, partition)]).get((metric, partition))
+    return _read_sums(folder / file, [(metric, partition)]).get((metric, partition))
 
 
-def check_sums(folder: Path, windows: int) -> None:
+def check_sums(folder: Path, record: ResultRecord) -> None:
     """Read everything that was counted, and forget it; a ResultError says what is missing or malformed."""
-    for key, found in _read_sums(folder, list(product(METRICS, PARTITIONS))).items():
-        if len(found) != windows:
-            fault = f"has {len(found)} windows, and result.json {windows}"
-            raise ResultError(fault, path=folder / SUMS_FILE, field=".".join(key))
+    for file in (SUMS_FILE, EXPECTED_FILE) if record.has_expected else (SUMS_FILE,):
+        for key, found in _read_sums(folder / file, list(product(METRICS, PARTITIONS))).items():
+            if len(found) != len(record.windows):
+                fault = f"has {len(found)} windows, and result.json {len(record.windows)}"
+                raise ResultError(fault, path=folder / file, field=".".join(key))
 
 
-def _read_sums(folder: Path, keys: Sequence[tuple[str, str]]) -> dict[tuple[str, str], NDArray[np.int32]]:
-    path, names = folder / SUMS_FILE, {key: ".".join(key) for key in keys}
+def _read_sums(path: Path, keys: Sequence[tuple[str, str]]) -> dict[tuple[str, str], NDArray[np.int32]]:
+    names = {key: ".".join(key) for key in keys}
     needed = tuple(name for key, name in names.items() if key[1] == "all")
     found = read_arrays(path, needed, optional=tuple(name for name in names.values() if name not in needed))
     sums = {key: found[name] for key, name in names.items() if name in found}

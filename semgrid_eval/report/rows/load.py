@@ -199,6 +199,6 @@ class _Loader:
     def _result(self, folder: Path) -> Result:
         record = files.read_result(folder)
         windows = self._windows.setdefault(record.windows, record.windows)
-        files.check_sums(folder, len(windows))
+        files.check_sums(folder, record)
         shared = record.model_copy(update={"windows": windows})
         return Result(shared, partial(files.read_sums, folder), files.read_history(folder), folder)

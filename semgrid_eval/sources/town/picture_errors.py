@@ -59,4 +59,4 @@ def coded_disparity(disparity_px: Float32s) -> NDArray[np.uint16]:
 
 def decoded_disparity(coded: NDArray[np.uint16]) -> Float32s:
     """Decode disparities (H, W); what is invalid, and what is at infinity, is 0."""
-    return np.maximum(coded.astype(np.float32) - np.float32(1.0), np.float32(0.0)) / np.float32(256.0)
+    return np.asarray(np.maximum(coded.astype(np.float32) - 1.0, 0.0) / 256.0, np.float32)

@@ -1,7 +1,7 @@
 """Draws the errors of a log of the simulated town again, from the plan that lies in it; no town and no SUMO is needed.
 
-Errors depend on random numbers and the size of pictures alone. So the plan's seed tells their state after any frame, and
-the exact pictures are in the log.
+Errors depend on random numbers and the size of pictures alone. So the plan's seed tells their state after any frame,
+and the exact pictures are in the log.
 """
 
 import json
@@ -31,7 +31,7 @@ class TownErrors:
 
     def __init__(self, seed: tuple[int, ...], stereo: Stereo) -> None:
         self._seed, self._stereo = seed, stereo
-        self._begin()
+        self._errors, self._frame = self._first(), -1
 
     def continued(self, exact: Pictures, newest: int, target: int, draws: int) -> Iterator[Pictures]:
         """Branch the errors after frame `newest` into draws of frame `target`, as `Redrawing` says."""
@@ -49,16 +49,17 @@ class TownErrors:
     def after(self, frame: int, picture: Pictures) -> PictureErrors:
         """Return the errors as they are after a frame; the picture tells the size."""
         if frame < self._frame:
-            self._begin()
+            self._errors, self._frame = self._first(), -1
         blank, blank_px = np.zeros_like(picture.label), np.zeros(picture.label.shape, np.float32)
         for _ in range(frame - self._frame):
             self._errors.add(blank, blank_px)
         self._frame = frame
         return self._errors
 
-    def _begin(self) -> None:
+    def _first(self) -> PictureErrors:
+        """Return the errors before the first frame, as a `Rig` begins them."""
         disparities, labels = recording_streams(self._seed)[-1].spawn(2)
-        self._errors, self._frame = PictureErrors.begin(self._stereo, disparities, labels), -1
+        return PictureErrors.begin(self._stereo, disparities, labels)
 
     def _numbers(self, *which: int) -> list[np.random.Generator]:
         return np.random.default_rng([*which, *self._seed]).spawn(2)
@@ -73,7 +74,9 @@ def of_log(log: LogReader) -> TownErrors:
     except (ValueError, KeyError, TypeError) as error:
         raise LogError(f"is not the plan of a recording: {error}", path=log.path, field="plan.json") from error
     if not is_current:
-        fault = "the log is not what this version renders from it (older, or with other labels), so nothing is drawn again"
+        fault = (
+            "the log is not what this version renders from it (older, or with other labels), so nothing is drawn again"
+        )
         raise UnknownTruthError(fault, path=log.path, field="plan.json")
     if stereo == "matched":
         fault = "its disparity comes from matching pictures, and such errors cannot be drawn again"

@@ -1,0 +1,44 @@
+"""The ceiling: who knows the exact world, and how the recording's errors stand at the newest input."""
+
+from pydantic import Field
+from torch import Tensor
+
+from semgrid_eval.config import Config
+from semgrid_eval.grids.draws import MOST_DRAWS, Draws
+from semgrid_eval.models.model import Given, Model
+from semgrid_eval.models.votes import likeliest
+from semgrid_eval.windows.data import WindowBatch
+
+
+class DrawSettings(Config):
+    """How the errors are drawn again."""
+
+    draws: int = Field(15, ge=1, le=MOST_DRAWS)
+
+
+class Ceiling(Model):
+    """The likeliest class of each cell, over draws that continue the recording's errors on the exact target.
+
+    What is measured at the target's time depends on the world there, which is known, and on errors, of which no more
+    is known than the inputs could tell. So no model exceeds it, but for the chance in a finite number of draws.
+    """
+
+    Settings = DrawSettings
+    family = "Truth"
+    bound = "upper"
+    files = ()
+
+    @classmethod
+    def in_words(cls, settings: DrawSettings) -> str:
+        """Say what it knows."""
+        return f"exact world, this recording's errors continued in {settings.draws} draws, likeliest class"
+
+    @classmethod
+    def asks(cls, settings: DrawSettings, given: Given) -> Draws:
+        """Ask for draws."""
+        return Draws(settings.draws, continued=True)
+
+    def predict(self, batch: WindowBatch) -> Tensor:
+        """Return the shares of the draws: (B, C, H, W)."""
+        assert batch.truth is not None
+        return likeliest(batch.truth)
