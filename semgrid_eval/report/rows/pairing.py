@@ -51,13 +51,36 @@ def reference_of(row: Row, rows: Sequence[Row]) -> Row | None:
 
 
 def main_group(rows: Sequence[Row]) -> list[Row]:
-    """Return the rows of the question that most rows answer; of equally many, the one that comes first."""
-    return max(by_question(rows), key=len, default=[])
+    """Return the rows of the question that most rows answer; of equally many, the one that comes first.
+
+    Rows that are told of the truth are left out, unless there are no others.
+    """
+    return max(by_question([row for row in rows if not row.uses_truth] or rows), key=len, default=[])
+
+
+def way_of(row: Row, rows: Sequence[Row]) -> tuple[Row, Row] | None:
+    """Find the ends of the way that a row is measured by: what anybody has, and what nobody exceeds.
+
+    Both are of the same run, have the same targets and look as many frames ahead. None for such rows themselves, and
+    where an end is missing.
+    """
+    alike = rows_alike(row, rows)
+    upper = next((other for other in alike if other.record.facts.bound == "upper"), None)
+    lowest = [other for other in alike if other.record.facts.bound == "lower" and other.record.facts.translate]
+    lower = max(lowest, key=lambda other: _nearness(upper or row, other), default=None)
+    return None if lower is None or upper is None or row in (lower, upper) else (lower, upper)
+
+
+def rows_alike(row: Row, rows: Sequence[Row]) -> list[Row]:
+    """Return the rows of the same run with the same targets that look as many frames ahead, itself among them."""
+    alike = [other for other in rows if other.run == row.run and comparable(row, other)]
+    return [other for other in alike if _frames_ahead(other) == _frames_ahead(row)]
 
 
 def headline(scores: Scores) -> Headline | None:
     """Find the best row among those that answer the main question; None where nothing is scored."""
-    rows = [entry.row for entry in scores.values() if np.isfinite(entry.mean[HEADLINE])]
+    finite = (entry.row for entry in scores.values() if np.isfinite(entry.mean[HEADLINE]))
+    rows = [row for row in finite if not row.uses_truth]
     if not rows:
         return None
     group = main_group(rows)
