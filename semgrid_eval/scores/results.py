@@ -191,7 +191,8 @@ def read_result(folder: Path) -> ResultRecord:
 def is_done(folder: Path, *, with_predictions: bool = False, with_history: bool = False) -> bool:
     """Tell whether a result parses, matches its id, has sums of every metric, and what else is asked for."""
     try:
-        check_sums(folder, read_result(folder))
+        record = read_result(folder)
+        check_sums(folder, len(record.windows), has_expected=record.has_expected)
         if with_predictions:
             read_predictions(folder)
         return not with_history or ((history := read_history(folder)) is not None and not history.empty)
@@ -229,12 +230,12 @@ def read_sums(folder: Path, metric: str, partition: str, file: str = SUMS_FILE) 
     return _read_sums(folder / file, [(metric, partition)]).get((metric, partition))
 
 
-def check_sums(folder: Path, record: ResultRecord) -> None:
+def check_sums(folder: Path, windows: int, *, has_expected: bool = False) -> None:
     """Read everything that was counted, and forget it; a ResultError says what is missing or malformed."""
-    for file in (SUMS_FILE, EXPECTED_FILE) if record.has_expected else (SUMS_FILE,):
+    for file in (SUMS_FILE, EXPECTED_FILE) if has_expected else (SUMS_FILE,):
         for key, found in _read_sums(folder / file, list(product(METRICS, PARTITIONS))).items():
-            if len(found) != len(record.windows):
-                fault = f"has {len(found)} windows, and result.json {len(record.windows)}"
+            if len(found) != windows:
+                fault = f"has {len(found)} windows, and result.json {windows}"
                 raise ResultError(fault, path=folder / file, field=".".join(key))
 
 

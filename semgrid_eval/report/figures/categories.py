@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -90,7 +91,7 @@ def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group], c
     return longest
 
 
-def _draw_told(axes: Axes, category: str, groups: Sequence[Group], strokes: Mapping[str, str]) -> Iterator[float]:
+def _draw_told(axes: Axes, category: str, groups: Sequence[Group], strokes: Mapping[str, Any]) -> Iterator[float]:
     """Draw what is reached with the truth across the bars of each group, and say how far that is."""
     for group in groups:
         ends = min(group.places.values()) - 0.5, max(group.places.values()) + 0.5

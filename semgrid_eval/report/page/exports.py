@@ -107,7 +107,7 @@ def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
         "calibration": curves.calibration_plots(everywhere(everything, "calibration")),
         "settings": settings.settings_plots(scores),
     }
-    tables |= {"way": way_table(scores, everything["iou"]["actors"].get("moving", {}), rows)}
+    tables |= {"way": way_table(scores, everything["iou"]["actors"].get("moving", {}), rows), "expected": None}
     expected, order = score_expected(rows, resampling), ""
     if scored := everywhere(expected, "iou"):
         found = order_of(scores, scored, main_group([entry.row for entry in scored.values()])[0].targets)

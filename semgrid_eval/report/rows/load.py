@@ -206,7 +206,7 @@ class _Loader:
     def _result(self, folder: Path) -> Result:
         record = files.read_result(folder)
         windows = self._windows.setdefault(record.windows, record.windows)
-        files.check_sums(folder, record)
+        files.check_sums(folder, len(windows), has_expected=record.has_expected)
         shared = record.model_copy(update={"windows": windows})
         expected = partial(files.read_sums, folder, file=files.EXPECTED_FILE) if record.has_expected else None
         return Result(shared, partial(files.read_sums, folder), files.read_history(folder), folder, expected)
