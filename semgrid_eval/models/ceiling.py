@@ -6,7 +6,7 @@ from torch import Tensor
 from semgrid_eval.config import Config
 from semgrid_eval.grids.draws import MOST_DRAWS, Draws
 from semgrid_eval.models.model import Given, Model
-from semgrid_eval.models.votes import likeliest
+from semgrid_eval.models.votes import likeliest, seen_cells
 from semgrid_eval.windows.data import WindowBatch
 
 
@@ -16,14 +16,24 @@ class DrawSettings(Config):
     draws: int = Field(15, ge=1, le=MOST_DRAWS)
 
 
+class CeilingSettings(DrawSettings):
+    """How the ceiling answers."""
+
+    # The mask M leaves out what an input saw and the target does not know, so nothing is lost by an answer there, and
+    # networks, whose loss is masked, learn that. With it, the ceiling answers by known classes alone where an input saw
+    # something; without, by unknown wherever most draws do not know. It is meant for masks that are not `off`.
+    seen_is_known: bool = True
+
+
 class Ceiling(Model):
     """The likeliest class of each cell, over draws that continue the recording's errors on the exact target.
 
     What is measured at the target's time depends on the world there, which is known, and on errors, of which no more
-    is known than the inputs could tell. So no model exceeds it, but for the chance in a finite number of draws.
+    is known than the inputs could tell. So no model has more cells right on average, but for the chance in a finite
+    number of draws; IoU follows closely, though not to the letter.
     """
 
-    Settings = DrawSettings
+    Settings = CeilingSettings
     family = "Truth"
     bound = "upper"
     files = ()
@@ -41,4 +51,5 @@ class Ceiling(Model):
     def predict(self, batch: WindowBatch) -> Tensor:
         """Return the shares of the draws: (B, C, H, W)."""
         assert batch.truth is not None
-        return likeliest(batch.truth)
+        seen = seen_cells(batch, translate=self.given.translate) if self.settings.seen_is_known else None
+        return likeliest(batch.truth, seen)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from support.toy_world import street
 from support.towns import small_plans
+from support.toy_world import street
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import UnknownTruthError

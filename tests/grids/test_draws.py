@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.toy_world import street
 from support.towns import small_plans
+from support.toy_world import street
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import UnknownTruthError

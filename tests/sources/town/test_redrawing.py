@@ -1,4 +1,4 @@
-"""Errors that are drawn again: the same random numbers give the recording's own frames, others give others like them."""
+"""Errors drawn again: the same random numbers give the recording's own frames, others give others like them."""
 
 import json
 from copy import deepcopy
@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.cameras import calibration
-from support.toy_world import street
 from support.towns import small_plans
+from support.toy_world import street
 
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import LogError, UnknownTruthError
@@ -61,7 +61,9 @@ def test_a_branch_that_goes_on_by_the_same_random_numbers_is_the_recording_byte_
     for _ in range(4):  # whatever the pictures show
         errors.add(blank, blank.astype(np.float32))
     branch = errors.branched(*deepcopy(numbers))
-    errors.branched(*np.random.default_rng(1).spawn(2)).add(blank, blank.astype(np.float32))  # another one changes nothing
+    errors.branched(*np.random.default_rng(1).spawn(2)).add(
+        blank, blank.astype(np.float32)
+    )  # another one changes nothing
     for frame in range(4, 7):
         label, depth_m = exact_picture(frame)
         measured, measured_px = branch.add(label, camera.disparity_px(depth_m))
@@ -90,7 +92,9 @@ def test_a_log_tells_its_own_errors_up_to_the_rounding_of_its_exact_disparity(lo
         state = errors.after(number - 1, pictures)
         label, disparity_px = deepcopy(state).add(pictures.label, decoded_disparity(pictures.disparity))
         assert np.array_equal(label, decode_gray(frames[number].label_png, bit_depth=8))
-        off = np.abs(coded_disparity(disparity_px).astype(int) - decode_gray(frames[number].disparity_png, bit_depth=16))
+        off = np.abs(
+            coded_disparity(disparity_px).astype(int) - decode_gray(frames[number].disparity_png, bit_depth=16)
+        )
         assert (off > 1).mean() < 1e-3
         assert (off == 0).mean() > 0.5
 
