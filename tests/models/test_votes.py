@@ -1,14 +1,16 @@
 """The likeliest class of draws, by hand."""
 
+import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from support.models import given as given_by
 from support.models import made
 
+from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.ceiling import Ceiling
 from semgrid_eval.models.fresh import FreshErrors
-from semgrid_eval.models.true_motion import FuseTrueMotion, moved_by
+from semgrid_eval.models.true_motion import FuseTrueMotion
 from semgrid_eval.models.votes import likeliest
 from semgrid_eval.windows.data import WindowBatch
 
@@ -70,21 +72,24 @@ def test_the_answer_is_as_a_slow_twin_says(seed):
             assert found[row, column] == most
 
 
-def test_cells_move_by_their_own_way_and_leave_unknown_behind():
-    grid = torch.tensor([[1, 6, 6, 1], [1, 1, 1, 1], [8, 1, 1, 6]], dtype=torch.uint8).numpy()
-    way = torch.zeros(3, 4, 2, dtype=torch.int64).numpy()
-    way[0, 1:3] = (1, 1)  # down and right
-    way[2, 3] = (1, 0)  # out of the grid
-    assert moved_by(grid, way).tolist() == [[1, 0, 0, 1], [1, 1, 6, 6], [8, 1, 1, 0]]
-    assert grid[0].tolist() == [1, 6, 6, 1]
-
-
-def test_true_motion_moves_each_input_and_overlays_them():
+def test_true_motion_draws_who_moves_where_he_comes_to_lie_and_clears_where_he_was():
     model = made(FuseTrueMotion)
-    older, newer = [[6, 1, 1, 1]], [[0, 6, 1, 0]]
-    motion_m = torch.zeros(1, 1, 2, 1, 4, 2)
-    cell_m = model.given.cell_m
-    motion_m[0, 0, 0, 0, 0, 1] = -2.0 * cell_m  # two cells to the right
-    motion_m[0, 0, 1, 0, 1, 1] = -1.4 * cell_m  # one, rounded
-    found = model.predict(batch([[[older, newer]]], motion_m)).argmax(dim=1)
-    assert found.flatten().tolist() == [0, 1, 6, 1]
+    older, newer = [[6, 1, 1, 1, 0]], [[0, 6, 1, 0, 3]]
+    truth = torch.zeros(1, 1, 2, 2, 1, 5, dtype=torch.uint8)
+    truth[0, 0, 0, 0, 0, 0], truth[0, 0, 0, 1, 0, 2] = 1, 6  # of the older input, from cell 0 to 2
+    truth[0, 0, 1, 0, 0, 1], truth[0, 0, 1, 1, 0, 3] = 1, 6  # of the newer one, from cell 1 to 3
+    found = model.predict(batch([[[older, newer]]], truth)).argmax(dim=1)
+    assert found.flatten().tolist() == [0, 1, 1, 6, 3]
+
+
+def test_what_is_left_moves_with_the_input():
+    truth = torch.zeros(1, 1, 1, 2, 1, 5, dtype=torch.uint8)
+    truth[0, 0, 0, 0, 0, 1] = 1
+    seen = [[[[[6, 6, 1, 1, 1]]]]]  # one column to the left of where the input had it
+    found = made(FuseTrueMotion).predict(batch(seen, truth, (0, -1))).argmax(dim=1)
+    assert found.flatten().tolist() == [0, 6, 1, 1, 1]
+
+
+def test_true_motion_needs_inputs_in_the_targets_place():
+    with pytest.raises(ConfigError, match="translate"):
+        FuseTrueMotion.check(FuseTrueMotion.parse_settings({}), given_by(translate=False))
