@@ -5,7 +5,7 @@ from torch import Tensor
 
 from semgrid_eval.config import Config
 from semgrid_eval.grids.draws import MOST_DRAWS, Draws
-from semgrid_eval.models.model import Given, Model
+from semgrid_eval.models.model import Given, Model, truth_of
 from semgrid_eval.models.votes import likeliest, seen_cells
 from semgrid_eval.windows.data import WindowBatch
 
@@ -50,6 +50,5 @@ class Ceiling(Model):
 
     def predict(self, batch: WindowBatch) -> Tensor:
         """Return the shares of the draws: (B, C, H, W)."""
-        assert batch.truth is not None
         seen = seen_cells(batch, translate=self.given.translate) if self.settings.seen_is_known else None
-        return likeliest(batch.truth, seen)
+        return likeliest(truth_of(batch), seen)

@@ -4,7 +4,7 @@ from torch import Tensor
 
 from semgrid_eval.grids.draws import Draws
 from semgrid_eval.models.ceiling import DrawSettings
-from semgrid_eval.models.model import Given, Model
+from semgrid_eval.models.model import Given, Model, truth_of
 from semgrid_eval.models.votes import likeliest
 from semgrid_eval.windows.data import WindowBatch
 
@@ -28,5 +28,4 @@ class FreshErrors(Model):
 
     def predict(self, batch: WindowBatch) -> Tensor:
         """Return the shares of the draws: (B, C, H, W)."""
-        assert batch.truth is not None
-        return likeliest(batch.truth)
+        return likeliest(truth_of(batch))

@@ -8,6 +8,7 @@ from torch import Tensor
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config, parse_config
+from semgrid_eval.errors import InputError
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 if TYPE_CHECKING:  # building grids needs the log readers; models do not
@@ -121,6 +122,17 @@ def one_hot(classes: Tensor) -> Tensor:
     """Turn class ids into certain scores: (B, H, W) uint8 -> (B, C, H, W) float32."""
     ids = torch.arange(CLASS_COUNT, dtype=torch.uint8, device=classes.device)
     return (classes[:, None] == ids[:, None, None]).float()
+
+
+def truth_of(batch: WindowBatch) -> Tensor:
+    """Return what a model that asks is told of the truth: (B, ...).
+
+    Raises:
+        InputError: it is told nothing; only a run tells.
+    """
+    if batch.truth is None:
+        raise InputError("this model is told of the truth, which only `semgrid-eval run` does, when it scores")
+    return batch.truth
 
 
 def parameter_count(model: Model) -> int | None:

@@ -9,7 +9,7 @@ from torch import Tensor
 from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.grids.moved_actors import MovedActors
-from semgrid_eval.models.model import Given, Model, one_hot
+from semgrid_eval.models.model import Given, Model, one_hot, truth_of
 from semgrid_eval.models.overlay import newest_first, overlay
 from semgrid_eval.windows.data import WindowBatch
 from semgrid_eval.windows.grids import shift_grids
@@ -38,8 +38,7 @@ class FuseTrueMotion(Model):
 
     def predict(self, batch: WindowBatch) -> Tensor:
         """Return the overlay as certain scores: (B, C, H, W)."""
-        assert batch.truth is not None
-        left, arrived = batch.truth.unbind(dim=3)
+        left, arrived = truth_of(batch).unbind(dim=3)
         stays = shift_grids(left, batch.shift_cells[:, None]) == 0
         bare = torch.where(stays, batch.past, UNKNOWN)
         moved = torch.where(arrived == UNKNOWN, bare, arrived)

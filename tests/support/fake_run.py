@@ -38,6 +38,7 @@ class FakeRow:
     baseline: bool | None = None  # `BL` are, if not said otherwise
     learns: bool | None = None  # what is not a baseline does, if not said otherwise
     cell_m: float = 0.78125  # of a grid with other cells, other targets
+    bound: str = ""  # `upper` and `told` rows are told of the truth
 
     @property
     def name(self) -> str:
@@ -50,6 +51,7 @@ class FakeRow:
         model = {"BL-Fuse": "fuse", "BL-DC": "newest", "BL-NT": "newest"}.get(self.name, self.family.lower())
         learns = not baseline if self.learns is None else self.learns
         changes = {"baseline": baseline, "learns": learns, "model": model, "inputs": self.inputs}
+        changes |= {"bound": self.bound.removeprefix("told"), "uses_truth": self.bound in ("upper", "told")}
         return found.model_copy(update=changes)
 
     @property
