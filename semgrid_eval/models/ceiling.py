@@ -11,17 +11,12 @@ from semgrid_eval.windows.data import WindowBatch
 
 
 class DrawSettings(Config):
-    """How the errors are drawn again."""
+    """How errors are drawn again, and how draws are answered by."""
 
     draws: int = Field(15, ge=1, le=MOST_DRAWS)
-
-
-class CeilingSettings(DrawSettings):
-    """How the ceiling answers."""
-
-    # The mask M leaves out what an input saw and the target does not know, so nothing is lost by an answer there, and
-    # networks, whose loss is masked, learn that. With it, the ceiling answers by known classes alone where an input saw
-    # something; without, by unknown wherever most draws do not know. It is meant for masks that are not `off`.
+    # The mask M leaves out what an input saw and the target does not know, so an answer there costs nothing, and
+    # networks, whose loss is masked, learn that. With this, too, only known classes are answered where an input saw
+    # something; without it, unknown wherever most draws do not know. It is meant for masks that are not `off`.
     seen_is_known: bool = True
 
 
@@ -33,7 +28,7 @@ class Ceiling(Model):
     number of draws; IoU follows closely, though not to the letter.
     """
 
-    Settings = CeilingSettings
+    Settings = DrawSettings
     family = "Truth"
     bound = "upper"
     files = ()

@@ -5,7 +5,7 @@ from torch import Tensor
 from semgrid_eval.grids.draws import Draws
 from semgrid_eval.models.ceiling import DrawSettings
 from semgrid_eval.models.model import Given, Model, truth_of
-from semgrid_eval.models.votes import likeliest
+from semgrid_eval.models.votes import likeliest, seen_cells
 from semgrid_eval.windows.data import WindowBatch
 
 
@@ -28,4 +28,5 @@ class FreshErrors(Model):
 
     def predict(self, batch: WindowBatch) -> Tensor:
         """Return the shares of the draws: (B, C, H, W)."""
-        return likeliest(truth_of(batch))
+        seen = seen_cells(batch, translate=self.given.translate) if self.settings.seen_is_known else None
+        return likeliest(truth_of(batch), seen)

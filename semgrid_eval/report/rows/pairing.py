@@ -65,7 +65,9 @@ def way_of(row: Row, rows: Sequence[Row]) -> tuple[Row, Row] | None:
     where an end is missing.
     """
     alike = rows_alike(row, rows)
-    upper = next((other for other in alike if other.record.facts.bound == "upper"), None)
+    # The mask M depends on inputs, so an end that sees the same ones is nearer; of several, the first is taken.
+    highest = [other for other in alike if other.record.facts.bound == "upper"]
+    upper = max(highest, key=lambda other: _nearness(row, other), default=None)
     lowest = [other for other in alike if other.record.facts.bound == "lower" and other.record.facts.translate]
     lower = max(lowest, key=lambda other: _nearness(upper or row, other), default=None)
     return None if lower is None or upper is None or row in (lower, upper) else (lower, upper)
