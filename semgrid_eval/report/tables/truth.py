@@ -13,7 +13,7 @@ from semgrid_eval.report.tables.values import value_table
 _MOVING_COLUMNS = ("vehicles", "person", "bicycle")
 _MOST_PAIRS = 4
 _WAY = (
-    "Share of the way from the lower to the upper end that each row has covered, (row − lower) / (upper − lower), "
+    "Share of the way from {lower} to {upper} that each row has covered, (row − lower) / (upper − lower), "
     "all resampled together, with 95% interval: of all cells, and of cells near moving actors."
 )
 _EXPECTED = (
@@ -27,14 +27,17 @@ def way_table(scores: Scores, moving: Scores, rows: Sequence[Row]) -> Table | No
     columns = [(LABELS[column], "all cells") for column in DIFFERENCE_COLUMNS]
     columns += [(LABELS[column], "near moving actors") for column in _MOVING_COLUMNS]
     near = {entry.row.name: (entry, way) for entry, way in ways(moving, rows)}
-    lines = []
-    for entry, way in ways(scores, rows):
+    found, lines = list(ways(scores, rows)), []
+    for entry, way in found:
         cells = [_share(entry, way, column) for column in DIFFERENCE_COLUMNS]
         there = near.get(entry.row.name)
         cells += [_share(*there, column) if there else Cell(ABSENT) for column in _MOVING_COLUMNS]
         kind = "truth" if entry.row.uses_truth else ""
         lines.append((Line(entry.row.name, tuple(cells), kind, entry.row.record.label),))
-    return Table("way", _WAY, "Row", tuple(columns), tuple(lines)) if lines else None
+    lower = ", ".join(dict.fromkeys(way.lower.row.name for _, way in found))
+    upper = ", ".join(dict.fromkeys(way.upper.row.name for _, way in found))
+    caption = _WAY.replace("{lower}", lower).replace("{upper}", upper)
+    return Table("way", caption, "Row", tuple(columns), tuple(lines)) if lines else None
 
 
 def expected_table(expected: Scores, order: Order) -> Table:

@@ -133,6 +133,7 @@ def test_the_table_has_shares_of_all_cells_and_near_moving_actors():
     )
     table = way_table(scores, moving, [entry.row for entry in scores.values()])
     found = {body[0].header: [cell.text for cell in body[0].cells] for body in table.bodies}
+    assert table.caption.startswith("Share of the way from BL-DC to top that each row has covered")
     absent = "\N{EN DASH}"
     assert found["ED-DC"] == ["50%", absent, "50%", absent, "50%", "30%", absent, absent]
     assert found["new"][-3:] == [absent] * 3
