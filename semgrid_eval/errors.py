@@ -32,6 +32,10 @@ class LogError(InputError):
     """An MCAP log is damaged, incomplete or lacks what is needed."""
 
 
+class UnknownTruthError(LogError):
+    """An MCAP log does not hold the truth that was asked for: recordings of real sensors never do."""
+
+
 class ResultError(InputError):
     """A result folder does not parse or does not belong where it is."""
 

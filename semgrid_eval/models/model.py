@@ -1,7 +1,7 @@
 """What every model is to a run, built in or one's own: settings, what a row gives it, and its answer."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import torch
 from torch import Tensor
@@ -11,7 +11,12 @@ from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
+if TYPE_CHECKING:  # building grids needs the log readers; models do not
+    from semgrid_eval.grids.truth import Truth
+
 _SCORE_TOLERANCE = 1e-3  # of probabilities that do not quite add up to 1
+Bound = Literal["", "lower", "upper"]
+"""An end of the way by which reports measure rows: what anybody has, and what nobody exceeds."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,7 @@ class Model:
     )
     baseline: ClassVar[bool] = False  # whether other rows are measured against it
     random: ClassVar[bool] = False  # whether chance plays a part: rows are repeated with seeds of torch's generator
+    bound: ClassVar[Bound] = ""  # whether it is an end of the way that rows are measured by
     files: ClassVar[tuple[str, ...] | None] = None
     """Files beside its module that it reads (weights): all of them, so that its results can be kept, or None."""
     version: ClassVar[str] = "1"  # part of all ids: counted up by whoever changes the numbers of a built-in model
@@ -79,6 +85,14 @@ class Model:
         Raises:
             ConfigError: settings and what the row gives do not fit.
         """
+
+    @classmethod
+    def asks(cls, settings: Any, given: Given) -> "Truth | None":  # noqa: ANN401 - of the class `Settings`
+        """Say what of the truth it is told in `WindowBatch.truth` when it is scored; nothing where it is a prediction.
+
+        A row that is told is never the best one, and its scores are lines beside those of others.
+        """
+        return None
 
     def fit(self, windows: WindowSet) -> None:
         """Learn from training windows; a model that does not say how learns nothing."""
@@ -149,6 +163,17 @@ def require_scores(answer: object, batch: WindowBatch, name: str) -> Tensor:
     if not -_SCORE_TOLERANCE <= low <= high <= 1 + _SCORE_TOLERANCE:
         raise InputError(f"is certain from {low:g} to {high:g}, and scores go from 0 to 1", field=name)
     return scores
+
+
+def truth_of(batch: WindowBatch) -> Tensor:
+    """Return what a model that asks is told of the truth: (B, ...).
+
+    Raises:
+        InputError: it is told nothing; only a run tells.
+    """
+    if batch.truth is None:
+        raise InputError("this model is told of the truth, which only `semgrid-eval run` does, when it scores")
+    return batch.truth
 
 
 def parameter_count(model: Model) -> int | None:

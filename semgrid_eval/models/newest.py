@@ -10,6 +10,7 @@ class RepeatNewest(Baseline):
     """BL-DC where the row translates, BL-NT where it does not: the newest grid of the first sensor, as it is given."""
 
     words = "newest input"
+    bound = "lower"
 
     def predict(self, batch: WindowBatch) -> Tensor:
         """Return the newest grid as certain scores: (B, C, H, W)."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import torch
 from torch import Tensor
@@ -16,7 +16,10 @@ from semgrid_eval.models.model import Given, Model, require_answer
 from semgrid_eval.models.network import Network, NetworkSettings
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
-_ATTRIBUTES = {"words": str, "family": str, "baseline": bool, "random": bool, "files": tuple | None}
+if TYPE_CHECKING:
+    from semgrid_eval.grids.truth import Truth
+
+_ATTRIBUTES = {"words": str, "family": str, "baseline": bool, "random": bool, "files": tuple | None, "bound": str}
 
 
 class _Guarded(Model):
@@ -55,6 +58,11 @@ class _Guarded(Model):
     def check(cls, settings: Any, given: Given) -> None:  # noqa: ANN401 - of the class `Settings`
         with cls._guard():
             super().check(settings, given)
+
+    @classmethod
+    def asks(cls, settings: Any, given: Given) -> "Truth | None":  # noqa: ANN401 - of the class `Settings`
+        with cls._guard():
+            return super().asks(settings, given)
 
     @classmethod
     @contextmanager

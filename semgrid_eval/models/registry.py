@@ -20,6 +20,9 @@ MODELS = {
     "fuse": f"{_HERE}.overlay:FuseAll",
     "table": f"{_HERE}.table:ClassTable",
     "flow": f"{_HERE}.flow:MoveOn",
+    "true_motion": f"{_HERE}.true_motion:FuseTrueMotion",
+    "fresh": f"{_HERE}.fresh:FreshErrors",
+    "ceiling": f"{_HERE}.ceiling:Ceiling",
 }
 """Where the class of each built-in model lies; a new model is its module, its test and a line here."""
 _loaded: dict[str, tuple[ModelFile, type[Model]]] = {}

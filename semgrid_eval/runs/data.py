@@ -24,6 +24,7 @@ from semgrid_eval.windows.grids import GridData, stack_recordings
 class GridSource(Protocol):
     """Where a run's grids come from, and what is known of their logs."""
 
+    cache: Path  # folder of what is worked out once and kept
     failed: dict[str, str]  # reasons, by the paths of logs that gave no grids
     records: dict[str, LogRecord]  # by the paths of logs
     log_of: dict[str, str]  # path of the log, by name of the recording
@@ -49,7 +50,7 @@ class RunData:
     ) -> None:
         self._folder = logs
         self._logs = find_logs(logs)
-        self._cache, self._executor, self._device, self._stage = cache, executor, device, stage
+        self.cache, self._executor, self._device, self._stage = cache, executor, device, stage
         self._configs = {grid_digest(row.grid): row.grid for row in rows}
         self._sensors = defaultdict[str, list[str]](list)
         for row in rows:
@@ -71,7 +72,7 @@ class RunData:
         if records:
             logs = {record.digest: self._folder / record.path for record in records}
             with self._stage("compare") as progress:
-                found = kept_fingerprints(logs, self._cache, executor=self._executor, progress=progress)
+                found = kept_fingerprints(logs, self.cache, executor=self._executor, progress=progress)
             for record in records:
                 known = record.model_copy(update={"fingerprint": found.get(record.digest)})
                 self.records[record.path] = known
@@ -103,7 +104,7 @@ class RunData:
             with self._stage("grids") as progress:
                 data_set = build_grids(
                     self._logs,
-                    self._cache,
+                    self.cache,
                     config,
                     sensors=self._sensors[key],
                     executor=self._executor,

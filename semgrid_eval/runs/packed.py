@@ -57,6 +57,7 @@ class PackedGrids:
 
     def __init__(self, folder: Path, rows: Sequence[Row], device: torch.device) -> None:
         self._folder, self._device = folder, device
+        self.cache = folder
         self._index = parse_config(PackedIndex, read_json(folder / INDEX_FILE), path=folder / INDEX_FILE)
         self._sensors = list(dict.fromkeys(sensor for row in rows for sensor in row.sensors))
         self._stacked: dict[str, GridData] = {}

@@ -2,7 +2,7 @@
 
 import operator
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -10,6 +10,7 @@ from semgrid_eval.config import Config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.grids.truth import Truth
 from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.registry import MODELS, find_model, installed_models, is_named
 from semgrid_eval.scores.evaluate import MaskMode
@@ -44,6 +45,8 @@ class Row(Config):
     # Groups of recordings (towns, cities, drives) of the training split that are scored instead of the validation
     # split, and not trained on: for choices, which are not to be made on what is scored in the end.
     hold_out: tuple[str, ...] = ()
+    # Where the logs to score tell their exact pictures: also score against what is measured on average, see `evaluate`.
+    second_target: Literal["expected"] | None = None
     window: WindowConfig = WindowConfig()
     # Leads to train on, from and to so many frames, where it is not the window's own alone: one training for all rows
     # that differ in the horizon.
@@ -117,8 +120,18 @@ class Row(Config):
         return _found(self.model)
 
     def identity(self) -> dict[str, object]:
-        """Return what determines the row's numbers, besides code and logs: all but its name and repeats."""
-        return self.model_dump(mode="json", exclude={"name", "repeats"})
+        """Return what determines the row's numbers, besides code and logs: all but its name and repeats.
+
+        A second target that is not asked for changes no id.
+        """
+        unset = {"second_target"} if self.second_target is None else set()
+        return self.model_dump(mode="json", exclude={"name", "repeats", *unset})
+
+    @property
+    def asked(self) -> Truth | None:
+        """What of the truth its model is told, if anything."""
+        found = self.found_model()
+        return found.asks(found.parse_settings(self.settings), self.given) if found else None
 
     @property
     def facts(self) -> RowFacts:
@@ -135,6 +148,8 @@ class Row(Config):
             sensors=self.sensors,
             translate=self.translate,
             disturbed=self.disturb.words if self.disturb else "",
+            uses_truth=self.asked is not None,
+            bound=found.bound if found else "",
         )
 
     @property

@@ -12,6 +12,7 @@ import torch
 from semgrid_eval.errors import ConfigError, SemgridError, first_line
 from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.grids.truth import Question
 from semgrid_eval.models.device import choose_device, is_out_of_memory, settle_process
 from semgrid_eval.models.registry import MODELS
 from semgrid_eval.places import remove_stale
@@ -22,6 +23,7 @@ from semgrid_eval.runs.packed import PackedGrids, is_packed
 from semgrid_eval.runs.record import Clock, Outcome, run_record
 from semgrid_eval.runs.row import Row, Unit, plan_units
 from semgrid_eval.runs.thumbnails import keep_pictures
+from semgrid_eval.runs.truth import work_out
 from semgrid_eval.runs.worker import Worker
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
@@ -76,6 +78,7 @@ def run_matrix(
     keep_record()
     if options.pictures:
         keep_pictures(out, _scored_windows(worker, rows), options.grid_executor, stage)
+    work_out(_questions(worker, rows), worker.scored_data.cache, options.grid_executor, stage)
     keys = list(wanted)
     with _unit_work(matrix, logs, out, options, worker) as (work, progress):
         progress(0, len(keys))
@@ -124,6 +127,13 @@ def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[Windo
     for row in rows:
         with suppress(SemgridError, torch.OutOfMemoryError):  # its units will tell
             yield worker.scored_windows(row)[0], row.grid
+
+
+def _questions(worker: Worker, rows: Iterable[Row]) -> Iterator[Question]:
+    """Return what rows ask of the truth."""
+    for row in rows:
+        with suppress(SemgridError, torch.OutOfMemoryError):  # its units will tell
+            yield from worker.questions(row)
 
 
 def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:

@@ -1,8 +1,8 @@
 """Works on units of a run: one row with one seed, fitted if need be, scored, and kept under the digest of all of it."""
 
 import logging
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import atomic_folder, digest_value
 from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
+from semgrid_eval.grids.truth import TRUTH_VERSION, Question
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
 from semgrid_eval.models.checkpoint import read_history, write_history
 from semgrid_eval.models.device import choose_precision, seeded
@@ -25,6 +26,7 @@ from semgrid_eval.progress import Stage
 from semgrid_eval.runs.data import GridSource, grid_digest
 from semgrid_eval.runs.job import SCORING_VERSION, Job, Resolved, Training, id_of_windows, target_key, window_records
 from semgrid_eval.runs.row import Row
+from semgrid_eval.runs.truth import EXPECTED, expected_target, parts_of, told
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
 from semgrid_eval.windows.data import (
@@ -99,6 +101,8 @@ class Worker:
         windows_id = id_of_windows(row, scored)
         training = self._training(resolved, row, seed, scored) if resolved.model.learns() else None
         config = {**row.identity(), "code": resolved.version}
+        if row.asked is not None or row.second_target is not None:
+            config["truth"] = TRUTH_VERSION
         learned = [training and training.id, seed]
         result_id = digest_value([results.FORMAT_VERSION, SCORING_VERSION, config, windows_id, learned])
         return Job(row, seed, resolved, result_id, config, scored, windows_id, training, left_out)
@@ -120,12 +124,27 @@ class Worker:
             return job
         with seeded(seed or 0, self.device):
             model, train_seconds = self._fitted(job)
-            with self.stage(f"score {row.name}") as progress:
-                evaluation = evaluate(model, job.scored, mask_mode=row.mask_mode, spec=row.grid.spec, progress=progress)
+            evaluation = self._evaluated(job, model)
         self._keep_windows(job.scored, job.windows_id)  # code of one's own may have removed them
-        record = self._result_record(job, model, train_seconds, evaluation.seconds)
+        record = self._result_record(job, model, train_seconds, evaluation)
         _keep_result(folder, record, evaluation, self._history(job), with_predictions=self._shows(seed))
         return job
+
+    def questions(self, row: Row) -> Iterator[Question]:
+        """List what a row asks of the truth."""
+        asked = [row.asked] if row.second_target is None else [row.asked, EXPECTED]
+        for truth in filter(None, asked):
+            yield from (part.question for part in parts_of(truth, self.scored_windows(row)[0], row.grid))
+
+    def _evaluated(self, job: Job, model: Model) -> Evaluation:
+        """Score a model on the windows of its row, telling it of the truth what it asks."""
+        row, cache, scored = job.row, self.scored_data.cache, job.scored
+        expected = expected_target(scored, row.grid, cache) if row.second_target else None
+        if row.asked is not None:
+            scored = replace(scored, truth=told(row.asked, scored, row.grid, cache))
+        score = partial(evaluate, model, scored, mask_mode=row.mask_mode, spec=row.grid.spec, expected=expected)
+        with self.stage(f"score {row.name}") as progress:
+            return score(progress=progress)
 
     def is_done(self, job: Job) -> bool:
         """Tell whether all that a job leaves lies in the run's folder."""
@@ -219,7 +238,7 @@ class Worker:
         return model, None
 
     def _result_record(
-        self, job: Job, model: Model, train_seconds: float | None, predict_seconds: float
+        self, job: Job, model: Model, train_seconds: float | None, evaluation: Evaluation
     ) -> results.ResultRecord:
         return results.ResultRecord(
             format_version=results.FORMAT_VERSION,
@@ -234,8 +253,9 @@ class Worker:
             windows=window_records(job.scored, self.scored_data.log_of),
             device=str(self.device),
             train_seconds=train_seconds,
-            predict_seconds=round(predict_seconds, 6),
+            predict_seconds=round(evaluation.seconds, 6),
             parameters=parameter_count(model),
+            has_expected=evaluation.expected_sums is not None,
         )
 
     def _keep_windows(self, windows: WindowSet, windows_id: str) -> None:
@@ -256,6 +276,8 @@ def _keep_result(
 ) -> None:
     with atomic_folder(folder) as partial:
         results.write_sums(partial, evaluation.sums, record.id)
+        if evaluation.expected_sums is not None:
+            results.write_sums(partial, evaluation.expected_sums, record.id, results.EXPECTED_FILE)
         if with_predictions:
             arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
             write_arrays(partial / results.PREDICTIONS_FILE, arrays, owner=record.id)

@@ -1,6 +1,7 @@
 """Predict once: run a model over all windows and keep what metrics counted, classes and certainty."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -28,6 +29,7 @@ class Evaluation:
     prediction: NDArray[np.uint8]  # (N, H, W) uint8 class ids
     certainty: NDArray[np.uint8]  # (N, H, W) uint8, the highest score of each cell, 255 = 1
     seconds: float  # time spent predicting, without gathering inputs
+    expected_sums: Sums | None = None  # what was counted against the expected target, where there is one
 
 
 def evaluate(
@@ -36,6 +38,7 @@ def evaluate(
     *,
     mask_mode: MaskMode = "exclude",
     spec: GridSpec | None = None,
+    expected: NDArray[np.uint8] | None = None,
     batch: int = 16,
     progress: Progress = silent,
 ) -> Evaluation:
@@ -46,6 +49,7 @@ def evaluate(
         windows: what is scored.
         mask_mode: how the cells of M are treated, see `apply_mask`.
         spec: extent of the grids; by default the vehicle is at the middle of the bottom edge.
+        expected: a second target (N, H, W) that the same predictions are scored against.
         batch: windows at once.
         progress: told of each batch.
 
@@ -77,14 +81,32 @@ def evaluate(
             actors=actors,
             spec=spec,
         )
-        parts.append(replace(answer, sums=count_windows(scored)))
+        counted = replace(answer, sums=count_windows(scored))
+        if expected is not None:
+            second = _against(expected[chosen], scored, answer.prediction, mask_mode)
+            counted = replace(counted, expected_sums=count_windows(second))
+        parts.append(counted)
         progress(min(start + batch, len(windows)), len(windows))
     return Evaluation(
-        {key: np.concatenate([part.sums[key] for part in parts]) for key in parts[0].sums},
+        _joined([part.sums for part in parts]),
         np.concatenate([part.prediction for part in parts]),
         np.concatenate([part.certainty for part in parts]),
         sum(part.seconds for part in parts),
+        None if expected is None else _joined([part.expected_sums or {} for part in parts]),
     )
+
+
+def _joined(parts: Sequence[Sums]) -> Sums:
+    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+
+
+def _against(
+    target: NDArray[np.uint8], scored: ScoredWindows, answer: NDArray[np.uint8], mask_mode: MaskMode
+) -> ScoredWindows:
+    """Put another target in the place of what was measured, and make M anew: what was seen and it does not know."""
+    seen = (scored.inputs != UNKNOWN).any(axis=(1, 2))
+    prediction, left_out = apply_mask(answer, seen & (target == UNKNOWN), mask_mode)
+    return replace(scored, target=target, prediction=prediction, left_out=left_out)
 
 
 def _predict(model: Model, seen: WindowBatch) -> Evaluation:

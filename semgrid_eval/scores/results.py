@@ -7,6 +7,8 @@ RUN/results/<id>/sums.npz      int32 arrays METRIC.PARTITION (N, regions, ...): 
                                counted in each window, by the regions of a partition of `scores.regions`; `iou.all` is
                                the confusion matrix (N, 1, C, C), [target, prediction], mask M left out. The partition
                                `actors` is there where a log has the truth
+RUN/results/<id>/expected.npz  where asked for and known: the same, counted against the target that is measured on
+                               average, the likeliest class of each cell over new errors drawn on the exact pictures
 RUN/results/<id>/history.csv   of trained models: epoch, updates, learning_rate, loss, validation_loss, seconds
 RUN/results/<id>/predictions.npz   prediction (N, H, W) uint8 class ids, certainty (N, H, W) uint8 (255 = 1.0)
 RUN/windows/<id>.npz           inputs (N, S, T, H, W) uint8 aligned, target (N, H, W) uint8, mask (N, H, W) bool;
@@ -21,7 +23,7 @@ import re
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -37,6 +39,7 @@ from semgrid_eval.seals import read_sealed, read_sealed_json, write_sealed_json
 FORMAT_VERSION = 2
 RUN_FILE, RESULT_FILE = "run.json", "result.json"
 SUMS_FILE = "sums.npz"
+EXPECTED_FILE = "expected.npz"
 PREDICTIONS_FILE = "predictions.npz"
 HISTORY_FILE = "history.csv"
 _RUN = "run"  # owns the record of a run, which has no id
@@ -85,6 +88,11 @@ class RowFacts(Config):
     sensors: tuple[str, ...]  # names of the inputs' sensors
     translate: bool  # whether inputs are moved into the target's place
     disturbed: str = ""  # what is wrong with its inputs, in words; empty where nothing is
+    uses_truth: bool = (
+        False  # whether it is told of the truth, so that it is a line beside the others and never the best
+    )
+    # Whether it is an end of the way that others are measured by: what anybody has, or what nobody exceeds.
+    bound: Literal["", "lower", "upper"] = ""
 
 
 class ResultRecord(Config):
@@ -108,6 +116,7 @@ class ResultRecord(Config):
     train_seconds: float | None
     predict_seconds: float
     parameters: int | None
+    has_expected: bool = False  # whether it is also scored against what is measured on average
 
 
 class RowRecord(Config):
@@ -186,7 +195,8 @@ def read_result(folder: Path) -> ResultRecord:
 def fault_of(folder: Path, *, with_predictions: bool = False, with_history: bool = False) -> str | None:
     """Say why a result is not done; None where it parses, matches its id and has sums and what else is asked for."""
     try:
-        check_sums(folder, len(read_result(folder).windows))
+        record = read_result(folder)
+        check_sums(folder, len(record.windows), has_expected=record.has_expected)
         if with_predictions:
             read_predictions(folder)
         if with_history and ((history := read_history(folder)) is None or history.empty):
@@ -223,35 +233,41 @@ def read_history(folder: Path) -> pd.DataFrame | None:
     return pd.read_csv(io.BytesIO(read_sealed(path, folder.name)), comment="#")
 
 
-def write_sums(folder: Path, sums: Sums, result_id: str = "") -> None:
-    """Write what every metric counted in a result's windows; the folder has its id as a name, if not given."""
+def write_sums(folder: Path, sums: Sums, result_id: str = "", file: str = SUMS_FILE) -> None:
+    """Write what every metric counted in a result's windows; the folder has its id as a name, if not given.
+
+    `file` is `EXPECTED_FILE` for that target.
+    """
     arrays = {".".join(key): array for key, array in sums.items()}
-    write_arrays(folder / SUMS_FILE, arrays, owner=result_id or folder.name)
+    write_arrays(folder / file, arrays, owner=result_id or folder.name)
 
 
-def read_sums(folder: Path, metric: str, partition: str, *, verify: bool = True) -> NDArray[np.int32] | None:
+def read_sums(
+    folder: Path, metric: str, partition: str, *, file: str = SUMS_FILE, verify: bool = True
+) -> NDArray[np.int32] | None:
     """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions.
 
     Who has called `check_sums` before need not `verify` the file each time.
     """
-    return _read_sums(folder, [(metric, partition)], verify=verify).get((metric, partition))
+    return _read_sums(folder / file, [(metric, partition)], verify=verify).get((metric, partition))
 
 
-def check_sums(folder: Path, windows: int) -> None:
+def check_sums(folder: Path, windows: int, *, has_expected: bool = False) -> None:
     """Read everything that was counted, and forget it; a ResultError says what is missing or malformed."""
-    for key, found in _read_sums(folder, list(product(METRICS, PARTITIONS))).items():
-        if len(found) != windows:
-            fault = f"has {len(found)} windows, and result.json {windows}"
-            raise ResultError(fault, path=folder / SUMS_FILE, field=".".join(key))
+    for file in (SUMS_FILE, EXPECTED_FILE) if has_expected else (SUMS_FILE,):
+        for key, found in _read_sums(folder / file, list(product(METRICS, PARTITIONS))).items():
+            if len(found) != windows:
+                fault = f"has {len(found)} windows, and result.json {windows}"
+                raise ResultError(fault, path=folder / file, field=".".join(key))
 
 
 def _read_sums(
-    folder: Path, keys: Sequence[tuple[str, str]], *, verify: bool = True
+    path: Path, keys: Sequence[tuple[str, str]], *, verify: bool = True
 ) -> dict[tuple[str, str], NDArray[np.int32]]:
-    path, names = folder / SUMS_FILE, {key: ".".join(key) for key in keys}
+    names = {key: ".".join(key) for key in keys}
     needed = tuple(name for key, name in names.items() if key[1] == "all")
     optional = tuple(name for name in names.values() if name not in needed)
-    found = read_arrays(path, needed, owner=folder.name, optional=optional, verify=verify)
+    found = read_arrays(path, needed, owner=path.parent.name, optional=optional, verify=verify)
     sums = {key: found[name] for key, name in names.items() if name in found}
     for (metric, partition), counted in sums.items():
         shape = (len(PARTITIONS[partition].regions), *METRICS[metric].shape)

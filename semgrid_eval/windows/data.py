@@ -137,6 +137,7 @@ class WindowBatch:
     lead_s: Tensor  # (B, T) float32 time from each input to the target
     target: Tensor  # (B, H, W) uint8
     mask: Tensor  # (B, H, W) bool, M: seen in an aligned input, yet unknown in the target
+    truth: Tensor | None = None  # (B, ...) what a model is told that says so by `Model.asks`; None for all others
 
 
 @dataclass(frozen=True)
@@ -175,6 +176,7 @@ class WindowSet:
     shift_cells: Tensor  # (N, T, 2) int64
     lead_s: Tensor  # (N, T) float32
     disturb: Disturb | None = None  # what is wrong with the inputs that a model sees; M and targets never change
+    truth: Tensor | None = None  # (N, ...) what of the truth is told; nothing but for a model that asks
 
     def __len__(self) -> int:
         return len(self.target_frames)
@@ -182,7 +184,9 @@ class WindowSet:
     def to(self, device: torch.device) -> "WindowSet":
         """Return the same windows with all tensors on another device."""
         tensors = ("sensor_rows", "inputs", "target_frames", "shift_cells", "lead_s")
-        return replace(self, data=self.data.to(device), **{name: getattr(self, name).to(device) for name in tensors})
+        moved = {name: getattr(self, name).to(device) for name in tensors}
+        truth = None if self.truth is None else self.truth.to(device)
+        return replace(self, data=self.data.to(device), truth=truth, **moved)
 
     def batch(self, chosen: Tensor | slice) -> WindowBatch:
         """Gather the chosen windows: (B,) int64 or a slice."""
@@ -201,6 +205,7 @@ class WindowSet:
             lead_s=lead_s,
             target=target,
             mask=mask,
+            truth=None if self.truth is None else self.truth[chosen],
         )
 
     def disturbed(self, how: Disturbance | None, spec: GridSpec) -> "WindowSet":

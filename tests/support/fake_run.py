@@ -40,6 +40,7 @@ class FakeRow:
     learns: bool | None = None  # what is not a baseline does, if not said otherwise
     cell_m: float = 0.78125  # of a grid with other cells, other targets
     disturbed: str = ""  # what is wrong with its inputs; on record
+    bound: str = ""  # `upper` and `told` rows are told of the truth
 
     @property
     def name(self) -> str:
@@ -53,6 +54,7 @@ class FakeRow:
         learns = not baseline if self.learns is None else self.learns
         changes = {"baseline": baseline, "learns": learns, "model": model, "inputs": self.inputs}
         changes["disturbed"] = self.disturbed
+        changes |= {"bound": self.bound.removeprefix("told"), "uses_truth": self.bound in ("upper", "told")}
         return found.model_copy(update=changes)
 
     @property

@@ -159,7 +159,11 @@ def weighted_sum(parts: Sequence[tuple[float, RowScores]], column: str) -> Estim
             raise ValueError(f"{first.row.name} and {entry.row.name} are scored on other targets or cells")
     at = column_names(first.metric).index(column)
     value = sum(weight * entry.mean[column] for weight, entry in parts)
-    draws = np.sum([weight * entry.draws[:, at] for weight, entry in parts], axis=0)
+    return interval_of(value, np.sum([weight * entry.draws[:, at] for weight, entry in parts], axis=0))
+
+
+def interval_of(value: float, draws: Floats) -> Estimate:
+    """Give a value the interval of its draws (B,), of those that are finite."""
     finite = draws[np.isfinite(draws)]
     if not np.isfinite(value) or len(finite) == 0:
         return Estimate(value, np.nan, np.nan)

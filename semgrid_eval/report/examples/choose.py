@@ -68,7 +68,7 @@ def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
     found = [Contest(main, tuple(_rivals(main, rows, headline)))]
     if later := _looking_further(main, rows):
         found.append(Contest(main, tuple(later), tuple(reference_of(row, rows) for row in (main, *later))))
-    others = [(row, reference_of(row, rows)) for row in rows if not row.is_baseline and row != main]
+    others = [(row, reference_of(row, rows)) for row in rows if not (row.is_baseline or row.uses_truth or row == main)]
     return found + [Contest(row, (reference,)) for row, reference in others if reference is not None]
 
 

@@ -2,11 +2,14 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from semgrid_eval.classes import CATEGORY_NAMES
@@ -14,7 +17,7 @@ from semgrid_eval.report.claims.claims import paper_value
 from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
 from semgrid_eval.report.figures import style
 from semgrid_eval.report.rows.load import Row
-from semgrid_eval.report.rows.pairing import by_question, settings_but
+from semgrid_eval.report.rows.pairing import by_question, rows_alike, settings_but
 
 _GAP = 1.0  # between questions, in bars' places; the words of a question stand in it
 _BAR_IN, _AROUND_IN = 0.19, 0.75  # height of a bar's place, and of title, legend and axis together
@@ -28,42 +31,54 @@ class Group:
 
     words: str
     places: dict[str, float]
+    told: tuple[RowScores, ...] = ()  # rows that are told of the truth about these targets: lines, not bars
 
 
 def category_plots(scores: Scores) -> list[style.Plot]:
     """Draw a panel for each category side by side in one figure, which names the rows once."""
-    if not scores:
-        return []
     groups = lay_out(scores)
+    if not groups:
+        return []
     places = [place for group in groups for place in group.places.values()]
     size_in = (_WIDE_IN, _AROUND_IN + _BAR_IN * (max(places) + 1 + _GAP))
     with mpl.rc_context(style.SETTINGS):
         figure = Figure(figsize=size_in, layout="constrained")
         panels = figure.subplots(1, len(CATEGORY_NAMES), sharey=True)
-        colours = style.family_colours(entry.row for entry in scores.values())
+        colours = style.family_colours(entry.row for entry in scores.values() if not entry.row.uses_truth)
+        strokes = style.truth_strokes(entry.row for entry in scores.values())
         for axes, category in zip(panels, CATEGORY_NAMES, strict=True):
-            _panel(axes, scores, category, groups, colours)
+            reach = _panel(axes, scores, category, groups, colours)
+            reach = max([reach, *_draw_told(axes, category, groups, strokes)])
+            axes.set_xlim(0, _ROOM * max(reach, 1e-3))
+            axes.set_xticks([tick for tick in axes.get_xticks() if tick <= 1])
         _name_rows(panels[0], groups)
-        handles, labels = [Patch(color=colour) for colour in colours.values()], list(map(style.short, colours))
-        figure.legend(handles, labels, fontsize=8, ncols=len(labels), loc="outside upper right", handlelength=1)
+        handles: list[Artist] = [Patch(color=colour) for colour in colours.values()]
+        handles += [Line2D([], [], color=style.INK, linestyle=stroke) for stroke in strokes.values()]
+        labels = [style.short(name.replace("_", " ")) for name in (*colours, *strokes)]
+        figure.legend(handles, labels, fontsize=8, ncols=len(labels), loc="outside upper right", handlelength=1.5)
         caption = f"Category IoU by row ({style.evidence(scores)}). Rows that answer the same question stand together;"
-        caption += f" lines are 95% intervals{style.paper_note(scores)}"
+        caption += " lines are 95% intervals"
+        caption += ", those across several bars the scores of who is told of the truth" if strokes else ""
+        caption += style.paper_note(scores)
         return [style.finish(figure, "categories", "summary.csv", caption)]
 
 
 def lay_out(scores: Scores) -> list[Group]:
     """Put the rows of each question together, baselines first, questions in the order of the matrix."""
     groups, at = [], 0.0
-    questions = by_question([entry.row for entry in scores.values()])
+    known = [entry.row for entry in scores.values()]
+    questions = by_question([row for row in known if not row.uses_truth])
     for rows in questions:
         ordered = sorted(rows, key=lambda row: not row.is_baseline)
         words = ", ".join(_differences(rows[0], questions[0][0])) or ", ".join(_differences(rows[0], None))
-        groups.append(Group(words, {row.name: at + i for i, row in enumerate(ordered)}))
+        told = tuple(scores[row.name] for row in rows_alike(rows[0], known) if row.uses_truth)
+        groups.append(Group(words, {row.name: at + i for i, row in enumerate(ordered)}, told))
         at += len(rows) + _GAP
     return groups
 
 
-def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group], colours: Mapping[str, str]) -> None:
+def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group], colours: Mapping[str, str]) -> float:
+    """Draw the bars of a category and return how far they reach."""
     longest = 0.0
     for name, place in (item for group in groups for item in group.places.items()):
         entry = scores[name]
@@ -73,8 +88,19 @@ def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group], c
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x")
-    axes.set_xlim(0, _ROOM * max(longest, 1e-3))
-    axes.set_xticks([tick for tick in axes.get_xticks() if tick <= 1])
+    return longest
+
+
+def _draw_told(axes: Axes, category: str, groups: Sequence[Group], strokes: Mapping[str, Any]) -> Iterator[float]:
+    """Draw what is reached with the truth across the bars of each group, and say how far that is."""
+    for group in groups:
+        ends = min(group.places.values()) - 0.5, max(group.places.values()) + 0.5
+        for entry in group.told:
+            value = entry.mean[category]
+            axes.plot(
+                [value, value], ends, color=style.INK, linestyle=strokes[entry.row.record.facts.model], linewidth=1
+            )
+            yield float(np.nan_to_num(value))
 
 
 def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str) -> float:
@@ -124,7 +150,7 @@ def horizon_lines(scores: Scores) -> list[list[RowScores]]:
         key = (entry.row.run, entry.row.targets, settings_but(entry.row, "horizon_steps"))
         lines.setdefault(key, {}).setdefault(_lead_s(entry), entry)  # rows that mean the same are one point
     found = [[line[lead] for lead in sorted(line)] for line in lines.values() if len(line) > 1]
-    return sorted(found, key=lambda line: not line[0].row.is_baseline)
+    return sorted(found, key=lambda line: (line[0].row.uses_truth, not line[0].row.is_baseline))
 
 
 def horizon_plots(scores: Scores) -> list[style.Plot]:
@@ -137,7 +163,8 @@ def horizon_plots(scores: Scores) -> list[style.Plot]:
         figure = Figure(figsize=(11.3, 3.0), layout="constrained")
         for axes, category in zip(figure.subplots(1, len(CATEGORY_NAMES), sharex=True), CATEGORY_NAMES, strict=True):
             for index, line in enumerate(lines):
-                _line(axes, line, category, style.PALETTE[index % len(style.PALETTE)])
+                colour = style.INK if line[0].row.uses_truth else style.PALETTE[index % len(style.PALETTE)]
+                _line(axes, line, category, colour)
             axes.set_title(LABELS[category], loc="left", fontweight="bold")
             axes.set_xticks(leads := sorted({_lead_s(e) for e in drawn.values()}), [f"{lead:.2f}" for lead in leads])
             axes.margins(x=0.12)
@@ -153,7 +180,8 @@ def _line(axes: Axes, line: Sequence[RowScores], category: str, colour: str) -> 
     leads = [_lead_s(entry) for entry in line]
     estimates = [entry.estimate(category) for entry in line]
     name = style.short(f"{line[0].row.name} \N{HORIZONTAL ELLIPSIS} {line[-1].row.name}")
-    axes.plot(leads, [e.value for e in estimates], "o-", color=colour, label=name, markersize=4)
+    form = "o:" if line[0].row.uses_truth else "o-"
+    axes.plot(leads, [e.value for e in estimates], form, color=colour, label=name, markersize=4)
     low, high = [e.low for e in estimates], [e.high for e in estimates]
     axes.fill_between(leads, low, high, color=colour, alpha=0.18, linewidth=0)
     papers = [paper_value(entry.row.record.name, category) for entry in line]

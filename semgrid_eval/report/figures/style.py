@@ -90,6 +90,12 @@ def family_colours(rows: Iterable[Row]) -> dict[str, str]:
     return {family: PALETTE[i % len(PALETTE)] for i, family in enumerate(families)}
 
 
+def truth_strokes(rows: Iterable[Row]) -> dict[str, Any]:
+    """Return the stroke of each model that is told of the truth, a whole line for what nobody exceeds."""
+    told = sorted((row.record.facts for row in rows if row.uses_truth), key=lambda facts: facts.bound != "upper")
+    return {model: STROKES[i % len(STROKES)] for i, model in enumerate(dict.fromkeys(facts.model for facts in told))}
+
+
 def line_style(index: int) -> dict[str, Any]:
     """Return the colour and stroke of one of many lines."""
     colours = len(PALETTE)

@@ -22,14 +22,18 @@ from semgrid_eval.report.estimates.bootstrap import (
     Scores,
     everywhere,
     score_all,
+    score_regions,
 )
+from semgrid_eval.report.estimates.division import of_cells
 from semgrid_eval.report.estimates.paces import divisions
+from semgrid_eval.report.estimates.way import Way, against_expected, order_of, ways
 from semgrid_eval.report.figures import categories, curves, settings
 from semgrid_eval.report.figures.curves import calibration_frame, timing_frame, training_frame
 from semgrid_eval.report.figures.settings import settings_frame
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
 from semgrid_eval.report.rows.load import Row, Run
+from semgrid_eval.report.rows.pairing import main_group
 from semgrid_eval.report.tables.formats.csv import as_csv, frame_csv
 from semgrid_eval.report.tables.formats.json import as_json
 from semgrid_eval.report.tables.formats.latex import as_latex
@@ -37,8 +41,11 @@ from semgrid_eval.report.tables.formats.markdown import as_markdown
 from semgrid_eval.report.tables.numbers import finite
 from semgrid_eval.report.tables.scores import division_tables, score_tables
 from semgrid_eval.report.tables.table import Table
+from semgrid_eval.report.tables.truth import expected_table, order_sentence, way_table
 from semgrid_eval.report.tables.values import reference_scores
 from semgrid_eval.scores.metrics.metric import column_names
+from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.tidy import FIGURE_COLUMNS
 
 PAGE, RECORD = "index.html", "report.json"
@@ -47,11 +54,21 @@ FILES = "files"
 FORMAT_VERSION = 3
 FORMATS: Mapping[str, Callable[[Table], str]] = {"csv": as_csv, "json": as_json, "md": as_markdown, "tex": as_latex}
 """By the ends of files' names; to add a format, add a line here."""
-_UNSCORED: dict[str, Any] = {"windows": 0, "seeds": 0, "cells": {}, "scores": {}, "reference": None, "differences": {}}
+_UNSCORED: dict[str, Any] = {
+    "windows": 0,
+    "seeds": 0,
+    "cells": {},
+    "scores": {},
+    "reference": None,
+    "differences": {},
+    "shares": {},
+}
 SUMMARY_COLUMNS = (
     *("row", "metric", "division", "region", "column", "value", "low", "high"),
     *("reference", "difference", "difference_low", "difference_high", "cells", "windows", "seeds"),
+    *("share", "share_low", "share_high"),
 )
+_SHARE = {"value": "share", "low": "share_low", "high": "share_high"}
 _DIFFERENCE = {"value": "difference", "low": "difference_low", "high": "difference_high"}
 
 Records = Mapping[str, Mapping[str, Mapping[str, Mapping[str, dict[str, Any]]]]]
@@ -70,6 +87,8 @@ class Material:
     tables: Mapping[str, Table | None]  # of the IoU of all cells
     parts: Mapping[str, Sequence[Table]]  # of every metric, by division
     figures: Mapping[str, Sequence[Plot]]
+    expected: Everything  # IoU against what is measured on average, of the rows that are scored so
+    order: str  # whether the order of rows is another one there, in a sentence
 
     @property
     def scores(self) -> Scores:
@@ -96,7 +115,19 @@ def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
         "calibration": curves.calibration_plots(everywhere(everything, "calibration")),
         "settings": settings.settings_plots(scores),
     }
-    return Material(runs, resampling, everything, findings, tables, division_tables(everything, parts), figures)
+    tables |= {"way": way_table(scores, everything["iou"]["actors"].get("moving", {}), rows), "expected": None}
+    expected, order = score_expected(rows, resampling), ""
+    if scored := everywhere(expected, "iou"):
+        found = order_of(scores, scored, main_group([entry.row for entry in scored.values()])[0].targets)
+        tables["expected"], order = expected_table(scored, found), order_sentence(scores, scored, found)
+    in_parts = division_tables(everything, parts)
+    return Material(runs, resampling, everything, findings, tables, in_parts, figures, expected, order)
+
+
+def score_expected(rows: Sequence[Row], resampling: Resampling) -> Everything:
+    """Score rows against what is measured on average, of all cells and near actors."""
+    parts = [of_cells(PARTITIONS[name]) for name in ("all", "actors")]
+    return {"iou": {part.name: score_regions(against_expected(rows), IOU, part, resampling) for part in parts}}
 
 
 def write_numbers(folder: Path, material: Material) -> None:
@@ -104,6 +135,7 @@ def write_numbers(folder: Path, material: Material) -> None:
     runs, records = material.runs, material.records
     frames = {
         "summary": summary_frame(records),
+        "expected": summary_frame(division_records(material.expected)),
         "scores": seed_frame(material.everything),
         "findings": finding_frame(material.findings),
         "calibration": calibration_frame(everywhere(material.everything, "calibration")),
@@ -157,6 +189,7 @@ def report_record(material: Material, records: Mapping[str, Any]) -> dict[str, A
         "failures": [vars(failure) for failure in failures(runs)],
         "rows": {row.name: _row_facts(row) | scored.get(row.name, _UNSCORED) for run in runs for row in run.rows},
         "metrics": records,
+        "expected": {"order": material.order, "metrics": division_records(material.expected)},
         "findings": finding_records(material.findings),
     }
 
@@ -179,6 +212,7 @@ def summary_frame(records: Records) -> pd.DataFrame:
         {**place, "row": name, **record, "column": column, "cells": record["cells"][column]}
         | record["scores"][column]
         | {_DIFFERENCE[key]: value for key, value in record["differences"].get(column, {}).items()}
+        | {_SHARE[key]: value for key, value in record["shares"].get(column, {}).items()}
         for place, region in _regions(records)
         for name, record in region.items()
         for column in record["scores"]
@@ -197,10 +231,7 @@ def division_records(everything: Everything) -> Records:
     rows = [entry.row for entry in everywhere(everything, "iou").values()]
     return {
         metric: {
-            division: {
-                region: {name: _record(entry, scores, rows) for name, entry in scores.items()}
-                for region, scores in parts.items()
-            }
+            division: {region: _region_records(scores, rows) for region, scores in parts.items()}
             for division, parts in divisions.items()
         }
         for metric, divisions in everything.items()
@@ -214,7 +245,12 @@ def _regions(of: Mapping[str, Mapping[str, Mapping[str, T]]]) -> Iterator[tuple[
                 yield {"metric": metric, "division": division, "region": region}, found
 
 
-def _record(entry: RowScores, scores: Scores, rows: Sequence[Row]) -> dict[str, Any]:
+def _region_records(scores: Scores, rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
+    found = {entry.row.name: way for entry, way in ways(scores, rows)}
+    return {name: _record(entry, scores, rows, found.get(name)) for name, entry in scores.items()}
+
+
+def _record(entry: RowScores, scores: Scores, rows: Sequence[Row], way: Way | None) -> dict[str, Any]:
     other, columns = reference_scores(entry, scores, rows), column_names(entry.metric)
     return {
         "windows": entry.windows,
@@ -223,6 +259,7 @@ def _record(entry: RowScores, scores: Scores, rows: Sequence[Row]) -> dict[str, 
         "scores": {column: _estimate(entry.estimate(column)) for column in columns},
         "reference": None if other is None else other.row.name,
         "differences": {} if other is None else {column: _estimate(entry.minus(other, column)) for column in columns},
+        "shares": {} if way is None else {column: _estimate(way.share(entry, column)) for column in columns},
     }
 
 

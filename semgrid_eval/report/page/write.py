@@ -26,6 +26,7 @@ from semgrid_eval.report.rows.load import Row, Run, key_of, load_runs
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, Headline, headline, verdict
 from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, plural, signed
 from semgrid_eval.report.tables.scores import confusion_table
+from semgrid_eval.report.tables.truth import way_sentence
 
 _SEED = 20190623  # any number does; a fixed one gives the same run the same intervals
 _FEW_RECORDINGS, _FEW_SEEDS = 10, 5
@@ -119,6 +120,7 @@ def render_page(material: Material) -> str:
         summary=summarise(runs, scores, found),
         resampled=material.resampling.sentence,
         tables=material.tables,
+        order=material.order,
         parts=material.parts,
         about_settings=sum(not in_paper(e.row.record.name) for e in scores.values()) > len(scores) / 2,
         findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
@@ -173,7 +175,7 @@ def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None) -> Su
     differences = {column: scores[model.name].minus(scores[other.name], column) for column in DIFFERENCE_COLUMNS}
     against = _in_words(model, other, differences)
     tiles = _tiles(model, other, differences)
-    sentences = (which, against, evidence) if against else (which, evidence)
+    sentences = tuple(filter(None, (which, way_sentence(scores, found.best), against, evidence)))
     return Summary(sentences, f"{model.name} {MINUS} {other.name}", tiles)
 
 

@@ -31,6 +31,8 @@ class Result:
     read: Callable[[str, str], NDArray[np.int32] | None]  # what a metric counted by a partition, as `read_sums` does
     history: pd.DataFrame | None
     folder: Path
+    # The same, counted against what is measured on average; None where it is not scored against that.
+    read_expected: Callable[[str, str], NDArray[np.int32] | None] | None = None
 
     @cached_property
     def counts(self) -> NDArray[np.int32]:
@@ -85,6 +87,11 @@ class Row:
     def is_baseline(self) -> bool:
         """Whether other rows are measured against this one."""
         return self.record.facts.baseline
+
+    @property
+    def uses_truth(self) -> bool:
+        """Whether it is told of the truth, so that it is a line beside the others and never the best."""
+        return self.record.facts.uses_truth
 
     @cached_property
     def group_of(self) -> Mapping[str, str]:
@@ -248,6 +255,10 @@ class _Loader:
     def _result(self, folder: Path) -> Result:
         record = files.read_result(folder)
         windows = self._windows.setdefault(record.windows, record.windows)
-        files.check_sums(folder, len(windows))
+        files.check_sums(folder, len(windows), has_expected=record.has_expected)
         shared = record.model_copy(update={"windows": windows})
-        return Result(shared, partial(files.read_sums, folder, verify=False), files.read_history(folder), folder)
+        expected = None
+        if record.has_expected:
+            expected = partial(files.read_sums, folder, file=files.EXPECTED_FILE, verify=False)
+        sums = partial(files.read_sums, folder, verify=False)
+        return Result(shared, sums, files.read_history(folder), folder, expected)

@@ -52,17 +52,39 @@ def reference_of(row: Row, rows: Sequence[Row]) -> Row | None:
 
 
 def main_group(rows: Sequence[Row]) -> list[Row]:
-    """Return the rows of the question that most rows answer, of undisturbed inputs where there are some.
+    """Return the rows of the question that most rows answer; of equally many, the one that comes first.
 
-    Of questions that equally many answer, it is the one that comes first.
+    Rows that are told of the truth, or whose inputs are disturbed, are left out, unless there are no others.
     """
-    undisturbed = [row for row in rows if not row.disturbed]
-    return max(by_question(undisturbed or rows), key=len, default=[])
+    usual = [row for row in rows if not row.uses_truth and not row.disturbed]
+    return max(by_question(usual or rows), key=len, default=[])
+
+
+def way_of(row: Row, rows: Sequence[Row]) -> tuple[Row, Row] | None:
+    """Find the ends of the way that a row is measured by: what anybody has, and what nobody exceeds.
+
+    Both are of the same run, have the same targets and look as many frames ahead. None for such rows themselves, and
+    where an end is missing.
+    """
+    alike = [other for other in rows_alike(row, rows) if not other.disturbed]
+    # The mask M depends on inputs, so an end that sees the same ones is nearer; of several, the first is taken.
+    highest = [other for other in alike if other.record.facts.bound == "upper"]
+    upper = max(highest, key=lambda other: _nearness(row, other), default=None)
+    lowest = [other for other in alike if other.record.facts.bound == "lower" and other.record.facts.translate]
+    lower = max(lowest, key=lambda other: _nearness(upper or row, other), default=None)
+    return None if lower is None or upper is None or row in (lower, upper) else (lower, upper)
+
+
+def rows_alike(row: Row, rows: Sequence[Row]) -> list[Row]:
+    """Return the rows of the same run with the same targets that look as many frames ahead, itself among them."""
+    alike = [other for other in rows if other.run == row.run and comparable(row, other)]
+    return [other for other in alike if _frames_ahead(other) == _frames_ahead(row)]
 
 
 def headline(scores: Scores) -> Headline | None:
     """Find the best row among those that answer the main question; None where nothing is scored."""
-    rows = [entry.row for entry in scores.values() if np.isfinite(entry.mean[HEADLINE])]
+    finite = (entry.row for entry in scores.values() if np.isfinite(entry.mean[HEADLINE]))
+    rows = [row for row in finite if not row.uses_truth]
     if not rows:
         return None
     group = main_group(rows)

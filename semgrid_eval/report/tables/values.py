@@ -58,9 +58,14 @@ def reference_scores(entry: RowScores, scores: Scores, rows: Sequence[Row] = ())
 
 
 def best_rows(scores: Scores, column: str) -> set[str]:
-    """Name the rows that are the best of those on the same cells; none is where it stands alone among others."""
+    """Name the rows that are the best of those on the same cells; none is where it stands alone among others.
+
+    Rows that are told of the truth do not compete.
+    """
     groups: dict[object, dict[str, float]] = {}
     for name, entry in scores.items():
+        if entry.row.uses_truth:
+            continue
         sign = {"higher": 1.0, "lower": -1.0, "": np.nan}[column_of(entry.metric, column).better]
         groups.setdefault(entry.cells_key, {})[name] = entry.mean[column] * sign
     best: set[str] = set()
@@ -95,7 +100,7 @@ def _value_body(entry: RowScores, best: Mapping[str, set[str]], *, beside_paper:
         value_cell(entry.estimate(name), title=evidence(entry, name), best=entry.row.name in rows)
         for name, rows in best.items()
     )
-    lines = [Line(entry.row.name, values, title=entry.row.record.label)]
+    lines = [Line(entry.row.name, values, "truth" if entry.row.uses_truth else "", title=entry.row.record.label)]
     paper = paper_table().get(entry.row.record.name, {}) if beside_paper else {}
     if set(best) <= set(paper):
         source = f"the paper's {entry.row.record.name}, Table A1: mean over 20 seeds, Cityscapes"

@@ -1,7 +1,9 @@
 """The imperfections of stereo disparity and of a segmentation network's labels, drawn frame by frame."""
 
+from copy import copy
 from dataclasses import dataclass
 from statistics import NormalDist
+from typing import Self
 
 import cv2
 import numpy as np
@@ -81,28 +83,38 @@ class DisparityErrors:
         self._mismatch: Float32s | None = None
         self._dropout: Float32s | None = None
 
-    def add(self, exact_px: Float32s) -> Float32s:
-        """Return the next frame's disparity (H, W) with errors, in pixels of its own width."""
+    def branched(self, rng: np.random.Generator) -> Self:
+        """Return the same errors after the same frames, which go on by other random numbers."""
+        branch = copy(self)  # fields are replaced and never changed
+        branch._rng = rng
+        return branch
+
+    def add(self, exact_px: Float32s, frames: int = 1) -> Float32s:
+        """Return the disparity (H, W) with errors of the frame that comes `frames` later, in pixels of its own width.
+
+        What nobody asks for between is not drawn: an autoregressive sequence can go on by several frames at once.
+        """
         noise, rng, shape = self._noise, self._rng, exact_px.shape
         sigma = noise.correlation * shape[1]
-        self._slow = _carried(self._slow, _smooth_field(shape, sigma, rng), noise.persistence)
+        self._slow = _carried(self._slow, _smooth_field(shape, sigma, rng), noise.persistence**frames)
         seen = _fattened(exact_px, noise.fattened, rng)
         error = noise.correlated_px * _smooth_field(shape, sigma, rng) + noise.slow_px * self._slow
         error += noise.white_px * rng.standard_normal(shape, np.float32)
-        error += self._mismatch_px(shape)
+        error += self._mismatch_px(shape, frames)
         noisy = np.asarray(seen + error * np.float32(shape[1] / FULL_WIDTH_PX), np.float32)
         fresh = _smooth_field(shape, 0.006 * shape[1], rng)
-        self._dropout = _carried(self._dropout, fresh, noise.dropout_persistence)
+        self._dropout = _carried(self._dropout, fresh, noise.dropout_persistence**frames)
         lost = self._dropout > self._dropout_threshold(seen)
         lost |= rng.random(shape, np.float32) < noise.speckle
         noisy[lost | _is_occluded(seen) | (seen <= 0.0)] = 0.0
         _match_sky(noisy, exact_px, noise.sky, rng)
         return np.maximum(noisy, 0.0)
 
-    def _mismatch_px(self, shape: tuple[int, ...]) -> Float32s:
+    def _mismatch_px(self, shape: tuple[int, ...], frames: int) -> Float32s:
         """Return the error (H, W) of patches that were matched to something else, 0 around them."""
         noise, sigma = self._noise, 0.008 * shape[1]
-        self._mismatch = _carried(self._mismatch, _smooth_field(shape, sigma, self._rng), noise.persistence)
+        persistence = noise.persistence**frames
+        self._mismatch = _carried(self._mismatch, _smooth_field(shape, sigma, self._rng), persistence)
         error_px = np.float32(noise.mismatch_px) * _smooth_field(shape, 2.0 * sigma, self._rng)
         return np.where(self._mismatch > _threshold(noise.mismatched), error_px, np.float32(0.0))
 
@@ -123,11 +135,18 @@ class LabelErrors:
         self._kept = (*[noise.persistence] * (len(_LABEL_FIELDS_PX) - 1), noise.mistakes_persistence)
         self._mistakes = _mistake_tables(noise.mistaken)
 
-    def add(self, exact: Labels) -> Labels:
-        """Return the next frame's labels (H, W) with errors."""
+    def branched(self, rng: np.random.Generator) -> Self:
+        """Return the same errors after the same frames, which go on by other random numbers."""
+        branch = copy(self)  # fields are replaced and never changed
+        branch._rng = rng
+        return branch
+
+    def add(self, exact: Labels, frames: int = 1) -> Labels:
+        """Return the labels (H, W) with errors of the frame that comes `frames` later, as `DisparityErrors.add`."""
         noise, scale = self._noise, exact.shape[1] / _LABEL_WIDTH_PX
         fresh = [_smooth_field(exact.shape, sigma_px * scale, self._rng) for sigma_px in _LABEL_FIELDS_PX]
-        fields = [_carried(*each) for each in zip(self._fields, fresh, self._kept, strict=True)]
+        kept = [persistence**frames for persistence in self._kept]
+        fields = [_carried(*each) for each in zip(self._fields, fresh, kept, strict=True)]
         self._fields = list(fields)
         right, down, border, confusion, mistake = fields
         reach = np.full(exact.shape, noise.warp_px * scale, np.float32)

@@ -15,6 +15,7 @@ from semgrid_eval.recording.types import Actor, Moment, MotionSample, Pose, Reco
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town import drives
 from semgrid_eval.sources.town.bodies import actor_ids, boxes_of, heights_m
+from semgrid_eval.sources.town.picture_errors import recording_streams
 from semgrid_eval.sources.town.rig import Rig
 from semgrid_eval.sources.town.sensors import Camera, RayCaster, View, look
 from semgrid_eval.sources.town.shading import Painter, Sunlight, draw_sunlight
@@ -145,7 +146,7 @@ def _moments(plan: RecordingPlan) -> Iterator[Moment]:
     town = load_town(plan.town)
     path = drives.ego_path(town.traffic, plan.drive)
     assert path is not None, "a plan's drive was checked when it was chosen"
-    stamps, reports, light, errors = np.random.default_rng(plan.seed).spawn(CONDITIONS)
+    stamps, reports, light, errors = recording_streams(plan.seed)
     times_s = plan.drive.start_s + np.arange(drives.FRAME_COUNT) / drives.FRAME_RATE_HZ
     times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, drives.FRAME_COUNT - 1))
     motion_noise = drives.EXACT_MOTION if plan.stereo == "exact" else plan.conditions.motion

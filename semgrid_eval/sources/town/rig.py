@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from semgrid_eval.recording.png import encode
 from semgrid_eval.recording.types import CameraFrame
 from semgrid_eval.sources.benchmarks import Stereo
-from semgrid_eval.sources.town.noise import DisparityErrors, LabelErrors
+from semgrid_eval.sources.town.picture_errors import PictureErrors, Strengths, coded_disparity
 from semgrid_eval.sources.town.sensors import Camera, View
 from semgrid_eval.sources.town.varied import Conditions
 
@@ -83,8 +83,8 @@ class Rig:
     def __init__(self, conditions: Conditions, stereo: Stereo, rng: np.random.Generator) -> None:
         disparities, labels = rng.spawn(2)
         self._camera = camera = Camera(conditions.calibration, conditions.width_px, conditions.height_px)
-        self._labels = None if stereo == "exact" else LabelErrors(conditions.label, labels)
-        self._errors = DisparityErrors(conditions.disparity, disparities) if stereo == "modelled" else None
+        strengths = Strengths(conditions.disparity, conditions.label)
+        self._errors = PictureErrors.begin(stereo, strengths, disparities, labels)
         self._matcher = StereoMatcher(camera, disparities) if stereo == "matched" else None
 
     @property
@@ -99,24 +99,15 @@ class Rig:
         shape = image.shape[:2]
         label, instance = view.label.reshape(shape)[:, margin_px:], view.instance.reshape(shape)[:, margin_px:]
         exact_px = self._camera.disparity_px(view.depth_m.reshape(shape)[:, margin_px:])
-        measured_px = self._measured(exact_px, [picture for _, picture in pictures])
+        measured, measured_px = self._errors.add(label, exact_px)
+        if self._matcher is not None:
+            measured_px = self._matcher.disparity_px(*(picture for _, picture in pictures))
         return CameraFrame(
             stamp_ns=stamp_ns,
             image_png=encode(image[:, margin_px:], _COLOUR_PNG),
             disparity_png=encode(coded_disparity(measured_px), _GREY_PNG),
-            label_png=encode(self._labels.add(label) if self._labels else label, _GREY_PNG),
+            label_png=encode(measured, _GREY_PNG),
             exact_label_png=encode(label, _GREY_PNG),
             exact_disparity_png=encode(coded_disparity(exact_px), _GREY_PNG),
             instance_png=encode(instance, _GREY_PNG),
         )
-
-    def _measured(self, exact_px: NDArray[np.float32], images: list[NDArray[np.uint8]]) -> NDArray[np.float32]:
-        if self._matcher is not None:
-            return self._matcher.disparity_px(*images)
-        return exact_px if self._errors is None else self._errors.add(exact_px)
-
-
-def coded_disparity(disparity_px: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Code disparities (H, W) as Cityscapes does: p = 256 d + 1, and 0 for what is not positive or too large."""
-    coded = np.rint(disparity_px * np.float32(256.0)) + np.float32(1.0)
-    return np.where((disparity_px > 0.0) & (coded <= 65535.0), coded, 0.0).astype(np.uint16)

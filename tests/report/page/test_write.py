@@ -61,7 +61,7 @@ def _report_of(tmp_path, **kwargs):
 
 def test_the_page_answers_in_order(page):
     titles = [a["id"] for a in _read(page).all("section")]
-    assert titles[:3] == ["summary", "categories", "classes"]
+    assert titles[:4] == ["summary", "categories", "ceiling", "classes"]
     assert titles[-3:] == ["examples", "failures", "provenance"]
 
 

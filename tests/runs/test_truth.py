@@ -1,0 +1,162 @@
+"""Rows that are told of the truth, and the second target: on logs that tell, and on logs that do not."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from support.drawn_again import write_town_like
+from support.small_runs import run, write_logs
+
+from semgrid_eval.executors import Processes
+from semgrid_eval.grids.draws import Draws
+from semgrid_eval.models.model import Given
+from semgrid_eval.models.network import Network
+from semgrid_eval.models.registry import MODELS, find_model
+from semgrid_eval.runs.data import RunData
+from semgrid_eval.runs.row import Row
+from semgrid_eval.runs.truth import told
+from semgrid_eval.scores import results
+from semgrid_eval.windows.data import WindowSet
+
+TOLD = [{"name": "top", "model": "ceiling", "settings": {"draws": 5}}, {"name": "new", "model": "fresh"}]
+SAME = {"name": "same", "model": "fresh", "settings": {"seen_is_known": False}}
+MOVED = {"name": "moved", "model": "true_motion"}
+PLAIN = [{"name": "BL-DC", "model": "newest"}, {"name": "BL-Fuse", "model": "fuse"}]
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    return write_town_like(tmp_path_factory.mktemp("town"))
+
+
+@pytest.fixture(scope="module")
+def out(logs, tmp_path_factory):
+    """A run with both targets, read only."""
+    folder = tmp_path_factory.mktemp("run") / "run"
+    run([*PLAIN, *TOLD, SAME, MOVED], logs, folder, second_target="expected")
+    return folder
+
+
+def folder_of(out, name):
+    (row,) = [row for row in results.read_run(out).rows if row.name == name]
+    assert row.failure is None, row.failure
+    return results.result_folder(out, row.results[0])
+
+
+def right(out, name, file=results.SUMS_FILE):
+    """The share of cells that a row has right, which is what the likeliest class is best at."""
+    counts = results.read_sums(folder_of(out, name), "iou", "all", file)[:, 0].sum(axis=0)
+    return np.trace(counts) / counts.sum()
+
+
+def test_who_knows_the_world_has_more_cells_right_than_who_sees_the_inputs(out):
+    assert right(out, "top") > max(right(out, "BL-DC"), right(out, "BL-Fuse"))
+    assert right(out, "new") > right(out, "BL-DC")
+
+
+def test_where_nobody_moves_true_motion_is_the_overlay(out):
+    mine, other = (results.read_predictions(folder_of(out, name))["prediction"] for name in ("moved", "BL-Fuse"))
+    np.testing.assert_array_equal(mine, other)
+
+
+def test_rows_say_that_they_are_told_of_the_truth(out):
+    facts = {row.name: row.facts for row in results.read_run(out).rows}
+    assert {name: each.uses_truth for name, each in facts.items()} == {
+        "BL-DC": False,
+        "BL-Fuse": False,
+        "top": True,
+        "new": True,
+        "same": True,
+        "moved": True,
+    }
+    assert {name for name, each in facts.items() if each.bound == "upper"} == {"top"}
+    assert not any(each.baseline for each in facts.values() if each.uses_truth)
+
+
+def test_the_second_target_is_what_most_draws_of_new_errors_say(out):
+    sums = results.read_sums(folder_of(out, "same"), "iou", "all", results.EXPECTED_FILE)[:, 0]
+    assert (sums == sums * np.eye(10, dtype=int)).all(), "15 draws of new errors are that target itself"
+    assert right(out, "BL-Fuse", results.EXPECTED_FILE) != right(out, "BL-Fuse")
+    measured, expected = (
+        results.read_sums(folder_of(out, "BL-DC"), "iou", "all", file)
+        for file in (results.SUMS_FILE, results.EXPECTED_FILE)
+    )
+    assert measured.sum(axis=-2).tolist() != expected.sum(axis=-2).tolist(), "each target has a mask of its own"
+
+
+def test_a_second_target_changes_no_score_against_the_first(out, logs, tmp_path):
+    run(PLAIN, logs, tmp_path / "run")
+    for name in ("BL-DC", "BL-Fuse"):
+        one, other = (results.read_sums(folder_of(each, name), "iou", "all") for each in (out, tmp_path / "run"))
+        np.testing.assert_array_equal(one, other)
+        assert not (folder_of(tmp_path / "run", name) / results.EXPECTED_FILE).exists()
+
+
+def test_on_logs_without_the_truth_such_rows_fail_in_a_line_and_others_go_on(tmp_path):
+    logs = write_logs(tmp_path / "logs")
+    record = run([*PLAIN, *TOLD, MOVED], logs, tmp_path / "run", second_target="expected")
+    failures = {row.name: row.failure for row in record.rows}
+    assert failures["BL-DC"] is failures["BL-Fuse"] is None
+    for name in ("top", "new"):
+        assert re.fullmatch(
+            r"\S+toy2\.mcap: holds no exact pictures whose errors can be drawn again: .*", failures[name]
+        )
+    assert "which pixels show whom" in failures["moved"]
+    assert not (folder_of(tmp_path / "run", "BL-DC") / results.EXPECTED_FILE).exists()
+
+
+def test_processes_give_the_same_as_this_one(out, logs, tmp_path):
+    run([PLAIN[0], TOLD[0]], logs, tmp_path / "run", Processes(2), second_target="expected")
+    for name in ("BL-DC", "top"):
+        for file in (results.SUMS_FILE, results.EXPECTED_FILE):
+            one, other = (
+                results.read_sums(folder_of(each, name), "iou", "all", file) for each in (out, tmp_path / "run")
+            )
+            np.testing.assert_array_equal(one, other)
+
+
+def test_a_run_goes_on_where_it_was_and_finds_what_it_worked_out(out, logs):
+    before = {path: path.stat().st_mtime_ns for path in out.parent.rglob("*.npz")}
+    run([*PLAIN, *TOLD, SAME, MOVED], logs, out, second_target="expected")
+    assert {path: path.stat().st_mtime_ns for path in out.parent.rglob("*.npz")} == before
+
+
+def test_windows_carry_the_truth_for_who_asks_alone(logs, tmp_path, monkeypatch):
+    seen: dict[str, bool] = {}
+    batch = WindowSet.batch
+
+    def noted(self, chosen):
+        found = batch(self, chosen)
+        seen[current[0]] = seen.get(current[0], False) or found.truth is not None
+        return found
+
+    monkeypatch.setattr(WindowSet, "batch", noted)
+    for row in ({"name": "ED-DC", "model": "ed"}, *PLAIN, *TOLD):
+        current = [row["name"]]
+        run([row], logs, tmp_path / row["name"])
+    assert seen == {"ED-DC": False, "BL-DC": False, "BL-Fuse": False, "top": True, "new": True}
+
+
+def test_no_network_and_no_baseline_asks_for_the_truth():
+    given = Given(("full",), 2, 128, 128, 100 / 128, translate=True)
+    asking = {name for name in MODELS if find_model(name).asks(find_model(name).parse_settings({}), given) is not None}
+    assert asking == {"ceiling", "fresh", "true_motion"}
+    assert not any(issubclass(find_model(name), Network) or find_model(name).baseline for name in asking)
+
+
+def test_answers_stand_at_their_windows_whatever_the_order_of_logs(logs, tmp_path):
+    from semgrid_eval.executors import InProcess
+    from semgrid_eval.progress import silent_stage
+    from semgrid_eval.windows.data import Window, WindowConfig, select_windows
+
+    row = Row(name="x", model="newest", window=WindowConfig(step_frames=3, target_frame=8))
+    data = RunData(logs, tmp_path, [row], executor=InProcess(), device=torch.device("cpu"), stage=silent_stage)
+    grids = data.data(row.grid, "val")
+    windows = [Window(1, (2, 5), 8), Window(0, (2, 5), 8), Window(1, (1, 4), 7)]
+    chosen = [select_windows(grids, [windows[i] for i in order], sensors=("full",)) for order in ((0, 1, 2), (2, 0, 1))]
+    one, other = (told(Draws(2, continued=True), each, row.grid, tmp_path) for each in chosen)
+    assert torch.equal(one[[2, 0, 1]], other)
+    assert not torch.equal(one[0], one[1])
+    assert replace(chosen[0], truth=one).batch(slice(1, 2)).truth.shape == (1, 10, 128, 128)
