@@ -7,7 +7,6 @@ import pandas as pd
 
 from semgrid_eval.config import parse_config
 from semgrid_eval.models.network import TrainingConfig
-from semgrid_eval.models.registry import MODELS
 from semgrid_eval.report.estimates.bootstrap import Estimate, Resampling, RowScores, score_regions
 from semgrid_eval.report.estimates.division import EVERYWHERE
 from semgrid_eval.report.rows.load import Row as ReadRow
@@ -38,20 +37,17 @@ AGAINST = ("BL-Fuse", "BL-DC")
 """Baselines that every row is measured against."""
 GOAL_H = 4.0
 REPEATS = 20
-_RESIDUAL = "residual"
 _SMOKE = {"epochs": 1, "updates_per_epoch": 1, "batch": 2}
 
 
 def paper_matrix(*, smoke: bool = False) -> Matrix:
-    """Return `paper` with one repeat, the baselines of `paper-cpu` and, where there is one, a residual network.
+    """Return `paper` with one repeat, and the baselines of `paper-cpu`.
 
-    That one is trained as long as the paper's. `smoke` keeps the first three rows, the network as small and trained as
+    `smoke` keeps the first three rows, the network as small and trained as
     little as can be.
     """
     paper, scaled = load_matrix("paper"), load_matrix("paper-cpu")
     rows = {row.name: row for row in (*scaled.rows, *paper.rows) if row in paper.rows or row.facts.baseline}
-    if _RESIDUAL in MODELS:
-        rows["RN-DC"] = Row(name="RN-DC", model=_RESIDUAL)
     names = [name for name in ORDER if name in rows][: 3 if smoke else None]
     sized = tuple(_sized(rows[name], smoke=smoke) for name in names)
     return Matrix(title=paper.title, seed=paper.seed, rows=sized)

@@ -6,9 +6,11 @@ from importlib import resources
 import pytest
 import yaml
 
+from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
 from semgrid_eval.models.registry import ENTRY_POINT_GROUP
+from semgrid_eval.models.residual import ResidualSettings
 from semgrid_eval.runs.matrix import load_matrix, preset_names
 
 SCALED = ("paper-cpu", "architecture-cpu", "sensitivity")
@@ -23,7 +25,17 @@ def load(tmp_path, content):
 def test_paper_has_the_rows_of_table_a1_in_its_order():
     with (resources.files("semgrid_eval.report") / "data" / "table_a1.csv").open() as stream:
         published = [line["experiment"] for line in csv.DictReader(stream)]
-    assert [row.name for row in load_matrix("paper").rows] == published
+    rows = load_matrix("paper").rows
+    assert [row.name for row in rows[: len(published)]] == published
+    assert {row.model for row in rows[len(published) :]} == {"residual"}
+
+
+def test_one_training_answers_every_lead_of_the_paper():
+    rows = [row for row in load_matrix("paper").rows if row.train_leads]
+    assert [row.name for row in rows] == ["RN-any-DC", "RN-any-PH1", "RN-any-PH2", "RN-any-PH3"]
+    assert [row.window.horizon_steps for row in rows] == [1, 2, 3, 4]
+    assert rows[0].train_leads == (1, 20)
+    assert {row.window.lead_frames for row in rows} <= set(rows[0].leads_frames)
 
 
 def test_paper_trains_as_the_supplement_says():
@@ -209,13 +221,16 @@ def test_paper_cpu_has_the_rows_of_paper_the_stronger_baselines_and_what_is_poss
     assert {(settings.features, settings.training.batch) for settings in trained} == {(32, 8)}
     assert {settings.training.updates_until(settings.training.epochs) for settings in trained} == {2200}
     assert {row.repeats for row in scaled} == {1}
+    residual = [parse_config(ResidualSettings, row.settings).training for row in scaled if row.model == "residual"]
+    assert set(residual) == {ResidualSettings().training}
 
 
 def test_real_trains_as_paper_cpu_and_scores_windows_that_fit_ten_frames():
     scaled = {row.name: row for row in load_matrix("paper-cpu").rows}
     rows = load_matrix("real").rows
     assert {row.name for row in rows} == set(scaled) - {
-        *("BL-PH2", "ED-PH2", "BL-PH3", "ED-PH3", "ED-SL4", "ED-SL5", "BL-Fuse-SL5", *TOLD)
+        *("BL-PH2", "ED-PH2", "BL-PH3", "ED-PH3", "ED-SL4", "ED-SL5", "BL-Fuse-SL5", *TOLD),
+        *("RN-PH2", "RN-PH3", "RN-any-PH2", "RN-any-PH3", "RN-SL5"),
     }
     for row in rows:
         alike = {"validation_window": None, "second_target": "expected"}

@@ -103,7 +103,7 @@ def finding_table(name: str, findings: Sequence[Finding]) -> Table:
         if each.verdict is not Verdict.NOT_RUN
     )
     columns = (("Verdict", ""), ("Score", ""), ("Difference", "95% interval"))
-    caption = f"The paper's claims, and the same against stronger baselines{_tag(findings)}."
+    caption = f"The paper's claims, the same against stronger baselines, and the residual network's{_tag(findings)}."
     return Table(name, caption, "Claim", columns, bodies)
 
 

@@ -105,7 +105,7 @@ def test_findings_stand_behind_the_classes_and_count_their_verdicts(page):
     found = _read(page)
     titles = [a["id"] for a in found.all("section")]
     assert titles[titles.index("classes") + 1 :][:2] == ["findings", "moving"]
-    assert "Of 25 claims, 9 can be tested here: 4 hold, 2 do not, 3 are undecided." in found.text
+    assert "Of 39 claims, 9 can be tested here: 4 hold, 2 do not, 3 are undecided." in found.text
     assert "ED-DC is better than BL-DC on static classes and vehicles does not hold" in found.text
     assert "ED-DC is better than BL-DC on moving vehicles alone holds" in found.text
     assert "ED-NT falls behind ED-DC on small classes ED-NT" in found.text  # its row failed, so it stands as a need
@@ -214,7 +214,7 @@ def test_one_row_only(lonely):
     assert "BL-DC has the highest mean class IoU" in text
     assert "no other row to compare with" in text
     assert "No row was trained" in text
-    assert "This run lacks the rows to test any of the 25 claims" in text
+    assert "This run lacks the rows to test any of the 39 claims" in text
     assert "No log here tells where the actors truly are" in text
     assert "actors" not in set(pd.read_csv(lonely.parent / "summary.csv").division)
 
