@@ -8,7 +8,7 @@ READY := $(VENV)/.ready
 REFERENCE ?= build/reference
 REFERENCE_REPORT ?= reports/reference
 REFERENCE_LOGS ?= convert town-v1 $(REFERENCE)/logs --size small
-REFERENCE_MATRIX ?= paper-cpu
+REFERENCE_MATRIX ?= reference
 REFERENCE_COMMANDS := "$(REFERENCE_LOGS)" \
   "run $(REFERENCE_MATRIX) --logs $(REFERENCE)/logs --out $(REFERENCE)/run --jobs 2" \
   "report $(REFERENCE)/run --out $(REFERENCE_REPORT)"

@@ -106,8 +106,13 @@ class TrainingFolder:
         return True
 
 
-def save_weights(network: Network, path: Path, *, owner: str = "", **notes: str) -> None:
-    """Write weights as sealed safetensors; the header says of what model they are, with which settings, and `notes`."""
+def save_weights(
+    network: Network, path: Path, *, owner: str = "", dtype: torch.dtype | None = None, **notes: str
+) -> None:
+    """Write weights as sealed safetensors; the header says of what model they are, with which settings, and `notes`.
+
+    Those that are floating-point numbers are kept in `dtype`, if given.
+    """
     header = {
         "model": type(network).__name__,
         "settings": network.settings.model_dump(mode="json"),
@@ -117,6 +122,8 @@ def save_weights(network: Network, path: Path, *, owner: str = "", **notes: str)
     }
     # Layers may share weights, which safetensors refuses to write.
     tensors = {name: value.detach().cpu().contiguous().clone() for name, value in network.state_dict().items()}
+    if dtype is not None:
+        tensors = {name: each.to(dtype) if each.is_floating_point() else each for name, each in tensors.items()}
     # One entry, because safetensors writes several in an order that changes from time to time.
     write_sealed(path, save(tensors, metadata={_HEADER: json.dumps(header, sort_keys=True)}))
 

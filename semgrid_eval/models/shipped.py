@@ -1,0 +1,48 @@
+"""The residual network that comes with the package, trained on the simulated town (docs/model-card.md)."""
+
+from importlib import resources
+from pathlib import Path
+
+from torch import Tensor
+
+from semgrid_eval.config import Config, parse_config
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.models.checkpoint import load_weights, read_header
+from semgrid_eval.models.model import Given, Model
+from semgrid_eval.models.residual import Residual, ResidualSettings
+from semgrid_eval.windows.data import WindowBatch
+
+WEIGHTS = Path("data") / "residual-town-v1.safetensors"
+CELL_M = 100 / 128
+_INPUTS = 2
+
+
+class TownResidual(Model):
+    """RN-town: told the lead, so that it answers any from 1 to 20 frames of the town, .06 to 1.2 s."""
+
+    words = "residual network trained on the simulated town, told the lead"
+    family = "RN"
+    files = ()
+
+    def __init__(self, settings: Config, given: Given) -> None:
+        super().__init__(settings, given)
+        with resources.as_file(resources.files("semgrid_eval") / WEIGHTS.as_posix()) as path:
+            built = parse_config(ResidualSettings, read_header(path)["settings"], path=path)
+            self._network = Residual(built, given)
+            load_weights(self._network, path)
+        self._network.eval()
+
+    @classmethod
+    def check(cls, settings: Config, given: Given) -> None:
+        """Refuse what it was not trained on: one sensor, two inputs moved to the target's time, the paper's cells."""
+        if given.grids != _INPUTS or given.inputs != _INPUTS:
+            asked = f"{len(given.sensors)} sensors and {given.inputs} inputs"
+            raise ConfigError(f"was trained on {_INPUTS} inputs of one sensor, not {asked}", field="model")
+        if not given.translate:
+            raise ConfigError("was trained on inputs moved to the target's time", field="model")
+        if abs(given.cell_m - CELL_M) > 0.01 * CELL_M:
+            raise ConfigError(f"was trained on cells of {CELL_M:g} m, not {given.cell_m:g} m", field="model")
+
+    def predict(self, batch: WindowBatch) -> Tensor:
+        """Return class probabilities: (B, C, H, W)."""
+        return self._network.to(batch.past.device).predict(batch)
