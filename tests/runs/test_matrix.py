@@ -108,7 +108,7 @@ def test_rows_override_defaults_key_by_key(tmp_path):
             [{"name": "a", "model": "ed", "settings": {"depth": 6}, "grid": {"spec": {"columns": 80}}}],
             r"row 'a': settings: depth 6 needs grids of a multiple of 32 cells, not 128 x 80",
         ),
-        ([{"name": "a", "model": "de"}], "row 'a': .*'de' is not one of ed, residual, newest"),
+        ([{"name": "a", "model": "de"}], "row 'a': .*'de' is not one of ed, residual, residual-town, newest"),
         ([{"name": "a", "model": "ed", "sensors": ["left"]}], "row 'a': .*'left' is not one of full, split1_upper"),
         ([{"name": "a", "model": "overlay"}], "settings.top: not one of .* alone has 'upper'"),
         (
