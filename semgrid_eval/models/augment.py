@@ -47,7 +47,7 @@ def augment(batch: WindowBatch, config: AugmentConfig, generator: torch.Generato
 
 def flipped(batch: WindowBatch, chosen: Tensor) -> WindowBatch:
     """Mirror the chosen windows (B,) left for right; M is left as it was."""
-    chosen = chosen.to(batch.target.device)
+    chosen = chosen.to(batch.target.device, non_blocking=True)
     past = torch.where(chosen[:, None, None, None, None], batch.past.flip(-1), batch.past)
     target = torch.where(chosen[:, None, None], batch.target.flip(-1), batch.target)
     sign = torch.stack([torch.ones_like(chosen, dtype=torch.int64), 1 - 2 * chosen.long()], dim=-1)
@@ -61,7 +61,7 @@ def rotated(batch: WindowBatch, angle_rad: Tensor) -> WindowBatch:
     unknown where that lies outside.
     """
     device = batch.target.device
-    cos, sin = angle_rad.cos().float().to(device), angle_rad.sin().float().to(device)
+    cos, sin = (each.float().to(device, non_blocking=True) for each in (angle_rad.cos(), angle_rad.sin()))
     rows, columns = batch.target.shape[-2:]
     source = _turned_from(cos, sin, rows, columns)
     row_shift, column_shift = batch.shift_cells.float().unbind(-1)  # (B, T) each
@@ -80,7 +80,7 @@ def misaligned(batch: WindowBatch, moved_cells: Tensor) -> WindowBatch:
 
     That is what errors of the egomotion do: `shift_cells` stay what was reported. Sensors move together.
     """
-    moved_cells = moved_cells.to(batch.past.device)
+    moved_cells = moved_cells.to(batch.past.device, non_blocking=True)
     return replace(batch, past=shift_grids(batch.past, moved_cells[:, None]))
 
 
@@ -93,7 +93,7 @@ def _turned_from(cos: Tensor, sin: Tensor, rows: int, columns: int) -> Tensor:
     row = torch.floor(cos * down + sin * right + middle_row + 0.5).long()
     column = torch.floor(cos * right - sin * down + middle_column + 0.5).long()
     inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    return torch.where(inside, row * columns + column, -1)
+    return (row * columns + column).masked_fill(~inside, -1)
 
 
 def _gathered(grids: Tensor, source: Tensor) -> Tensor:

@@ -102,8 +102,8 @@ class NetworkSettings(Config):
     @classmethod
     def _over_its_own(cls, values: object) -> object:
         """Put what is set of the training over the default of this network, not over the paper's."""
-        own = cls.model_fields["training"].default
-        return strictly(TrainingConfig, merged(own.model_dump(), values)) if isinstance(values, dict) else values
+        own = cls.model_fields["training"].get_default(call_default_factory=True)
+        return strictly(type(own), merged(own.model_dump(), values)) if isinstance(values, dict) else values
 
 
 class Network(Model, torch.nn.Module):

@@ -51,7 +51,7 @@ class CellPrior(nn.Module):
         for place, grid in enumerate(grids.unbind(dim=1)):
             known, first = grid != UNKNOWN, newest == UNKNOWN
             before = torch.where(known & ~first & (before == UNKNOWN), grid, before)
-            age = torch.where(known & first, place, age)
+            age = age.masked_fill(known & first, place)
             newest = torch.where(first, grid, newest)
         lead = batch.lead_s[:, -1] * (self._lead_bins / self._lead_span_s)
         bin_number = lead.long().clamp(0, self._lead_bins - 1)[:, None, None]

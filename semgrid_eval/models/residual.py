@@ -151,6 +151,8 @@ class _Fine(nn.Module):
 class _ShiftMixture(nn.Module):
     """Moves the cells of what can move by a mixture of displacements that each place of the trunk chooses."""
 
+    movable: Tensor  # (M,) ids of their classes
+
     def __init__(self, width: int, reach: int) -> None:
         super().__init__()
         self._reach, side = reach, 2 * reach + 1
@@ -162,6 +164,7 @@ class _ShiftMixture(nn.Module):
         stay[side * side // 2] = _STAY
         self.choose.bias = nn.Parameter(stay)
         nn.init.constant_(torch.as_tensor(self.gate.bias), _SHUT)
+        self.register_buffer("movable", torch.tensor(MOVABLE), persistent=False)
 
     def forward(self, features: Tensor, planes: Tensor, sensors: int) -> Tensor:
         """Return what is added to the logits: (B, C, H, W).
@@ -172,7 +175,8 @@ class _ShiftMixture(nn.Module):
             sensors: S.
         """
         batch, _, rows, columns = planes.shape
-        newest = planes.view(batch, sensors, -1, CLASS_COUNT, rows, columns)[:, :, -1, MOVABLE].amax(dim=1)
+        newest = planes.view(batch, sensors, -1, CLASS_COUNT, rows, columns)[:, :, -1].amax(dim=1)
+        newest = newest.index_select(1, self.movable)
         folded = F.pixel_unshuffle(newest, FOLD)  # (B, 4 M, H / 2, W / 2), M classes that move
         seen = F.unfold(folded, 2 * self._reach + 1, padding=self._reach)
         seen = seen.view(batch, folded.shape[1], -1, *folded.shape[-2:])  # (B, 4 M, displacements, H / 2, W / 2)
@@ -181,4 +185,4 @@ class _ShiftMixture(nn.Module):
         gate = F.interpolate(self.gate(features).sigmoid(), scale_factor=FOLD, mode="nearest")
         change = gate * self.gain * (moved - newest)
         added = change.new_zeros(batch, CLASS_COUNT, rows, columns)
-        return added.index_copy(1, torch.tensor(MOVABLE, device=change.device), change)
+        return added.index_copy(1, self.movable, change)

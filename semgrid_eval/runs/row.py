@@ -79,8 +79,7 @@ class Row(Config):
         if self.scored_window.inputs != self.window.inputs:
             raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
         self._check_leads()
-        if self.disturb:
-            self.disturb.check(self.window.inputs)
+        self._check_disturb()
         if found := self.found_model():
             found.check(found.parse_settings(self.settings), self.given)
         return self
@@ -93,6 +92,13 @@ class Row(Config):
         reach, target = self.window.span_frames + self.train_leads[1], self.window.target_frame
         if target is not None and reach > target:
             raise ValueError(f"train_leads reach back {reach} frames, and target_frame is {target}")
+
+    def _check_disturb(self) -> None:
+        if self.disturb is None:
+            return
+        if self.asked is not None:
+            raise ValueError("disturb: a row that is told of the truth has no inputs to disturb")
+        self.disturb.check(self.window.inputs)
 
     @property
     def scored_window(self) -> WindowConfig:

@@ -6,6 +6,7 @@ from support.cuda import CPU, CUDA, NEEDS_CUDA, NETWORKS, settled, windows_of
 from support.models import given, network
 from support.recordings import drifting_blocks
 
+from semgrid_eval.models.augment import AugmentConfig, augment
 from semgrid_eval.models.checkpoint import CHECKPOINT_FILE, WEIGHTS_FILE
 from semgrid_eval.models.network import autocast
 from semgrid_eval.models.registry import find_model
@@ -17,6 +18,7 @@ __all__ = ["settled"]
 SIZE, EPOCHS, UPDATES = 32, 2, 10
 # Small, so that loading kernels takes most of the time. Layers of zeros give gradients of rounding errors alone, which
 # optimisers that divide by their size make large: a network that starts from its table is not compared.
+CHANGES = AugmentConfig(flip=0.5, rotate_deg=2.0, misalign_cells=1)
 SMALL = {"ed": {"features": 16}, "residual": {"widths": [16, 32], "fine": 8, "shift": 1, "prior": False}}
 
 
@@ -100,10 +102,10 @@ def test_a_checkpoint_goes_on_on_the_other_device(name, first, second, tmp_path)
 
 def test_no_update_waits_for_the_device(name):
     made, data = untrained(name, "bf16").to(CUDA).train(), windows().to(CUDA)
-    optimizer, chosen = made.optimizer(), torch.arange(8, device=CUDA)
+    optimizer, chosen, generator = made.optimizer(), torch.arange(8, device=CUDA), torch.Generator()
 
     def update():
-        batch = data.batch(chosen)
+        batch = augment(data.batch(chosen), CHANGES, generator, translate=True)
         with autocast(CUDA, torch.bfloat16):
             logits = made(batch)
         loss = made.loss(logits.float(), batch)

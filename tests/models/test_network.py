@@ -6,6 +6,7 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import Field
 from support.models import network
 from support.recordings import random_recording
 from torch.nn import functional as F
@@ -15,7 +16,14 @@ from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.encoder_decoder import EncoderDecoder
 from semgrid_eval.models.model import one_hot
-from semgrid_eval.models.network import ScheduleConfig, TrainingConfig, input_planes, jaccard_loss, masked_loss
+from semgrid_eval.models.network import (
+    NetworkSettings,
+    ScheduleConfig,
+    TrainingConfig,
+    input_planes,
+    jaccard_loss,
+    masked_loss,
+)
 from semgrid_eval.windows.data import Window, select_windows
 from semgrid_eval.windows.grids import stack_recordings
 
@@ -122,3 +130,14 @@ def test_the_loss_of_a_training_is_what_its_settings_ask_for():
 def test_an_epoch_without_a_whole_batch_is_refused():
     with pytest.raises(ConfigError, match="an epoch of 7 windows does not fill a batch of 8"):
         parse_config(TrainingConfig, {"updates_per_epoch": 7, "batch": 8, "epoch_unit": "windows"})
+
+
+def test_a_network_may_have_a_training_of_its_own_class():
+    class Mine(TrainingConfig):
+        extra: int = 3
+
+    class Settings(NetworkSettings):
+        training: Mine = Field(default_factory=Mine)
+
+    found = parse_config(Settings, {"training": {"epochs": 2}})
+    assert (found.training.epochs, found.training.extra, type(found.training)) == (2, 3, Mine)

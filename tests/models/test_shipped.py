@@ -1,5 +1,6 @@
 """The network that comes with the package: small, sealed, for what it was trained on, told the lead."""
 
+import hashlib
 from dataclasses import replace
 from importlib import resources
 
@@ -8,7 +9,7 @@ import torch
 from support.models import given, made
 from support.recordings import random_recording
 
-from semgrid_eval.errors import ConfigError
+from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.models.checkpoint import read_header
 from semgrid_eval.models.registry import find_model
 from semgrid_eval.models.shipped import CELL_M, WEIGHTS, TownResidual
@@ -29,10 +30,12 @@ def test_the_file_is_small_and_sealed_and_says_what_it_is():
     header = read_header(path)
     assert header["model"] == "Residual"
     assert header["settings"]["lead_input"]
+    # Results made with other weights have other ids.
+    assert TownResidual.version == hashlib.sha256(path.read_bytes()).hexdigest()[:8]
 
 
 def test_it_answers_by_name_with_probabilities_that_depend_on_the_lead(batch):
-    model = made(find_model("residual-town"), given(size=24, cell_m=CELL_M))
+    model = made(find_model("residual-town"), given(size=24, cell_m=CELL_M)).eval()
     answers = [model.predict(replace(batch, lead_s=batch.lead_s + later)) for later in (0.0, 0.6)]
     torch.testing.assert_close(answers[0].sum(dim=1), torch.ones(2, 24, 24))
     assert not torch.equal(*answers)
@@ -52,6 +55,12 @@ def test_what_it_was_not_trained_on_is_refused(changes, fault):
     row = given(**{"size": 24, "cell_m": CELL_M, **changes})
     with pytest.raises(ConfigError, match=fault):
         TownResidual.check(TownResidual.parse_settings({}), row)
+
+
+def test_a_longer_lead_than_it_was_trained_on_is_refused(batch):
+    model = made(TownResidual, given(size=24, cell_m=CELL_M)).eval()
+    with pytest.raises(InputError, match=r"was trained on leads up to 1\.25 s, not 2\.00 s"):
+        model.predict(replace(batch, lead_s=torch.full_like(batch.lead_s, 2.0)))
 
 
 def test_it_learns_nothing():

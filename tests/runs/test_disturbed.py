@@ -141,6 +141,12 @@ def test_faults_name_the_row_and_the_key(tmp_path, disturb, message):
         load_matrix(str(tmp_path / "m.yaml"))
 
 
+def test_a_row_that_is_told_of_the_truth_has_no_inputs_to_disturb(tmp_path):
+    (tmp_path / "m.yaml").write_text("rows: [{name: a, model: true_motion, disturb: {kind: reversed_order}}]")
+    with pytest.raises(ConfigError, match="a row that is told of the truth has no inputs to disturb"):
+        load_matrix(str(tmp_path / "m.yaml"))
+
+
 def test_a_row_whose_inputs_are_right_is_digested_as_before_there_were_disturbances():
     (row,) = (row for row in load_matrix("paper").rows if row.name == "BL-DC")
     assert "disturb" not in row.identity()

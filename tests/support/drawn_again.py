@@ -14,6 +14,7 @@ from semgrid_eval.recording.types import Moment, Pose, Recording
 from semgrid_eval.sources.town.drives import Drive
 from semgrid_eval.sources.town.picture_errors import (
     PictureErrors,
+    Strengths,
     coded_disparity,
     decoded_disparity,
     recording_streams,
@@ -39,7 +40,7 @@ def write_town_like(folder: Path, *, frames: int = 9) -> Path:
 
 
 def _with_errors(world: ToyWorld, plain: Recording, seed: tuple[int, ...]) -> Iterator[Moment]:
-    errors = PictureErrors.begin("modelled", *recording_streams(seed)[-1].spawn(2))
+    errors = PictureErrors.begin("modelled", Strengths(), *recording_streams(seed)[-1].spawn(2))
     for moment, pose in zip(plain.moments(), world.poses(), strict=True):
         frame = moment.cameras["front"]
         label = decode_gray(frame.label_png, bit_depth=8)

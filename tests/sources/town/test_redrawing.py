@@ -19,6 +19,7 @@ from semgrid_eval.sources.redrawing import Pictures, redrawing_of
 from semgrid_eval.sources.town.noise import DisparityErrors, DisparityNoise
 from semgrid_eval.sources.town.picture_errors import (
     PictureErrors,
+    Strengths,
     coded_disparity,
     decoded_disparity,
     recording_streams,
@@ -27,6 +28,7 @@ from semgrid_eval.sources.town.redrawing import TownErrors
 from semgrid_eval.sources.town.rendering import render_recording
 from semgrid_eval.sources.town.rig import Rig
 from semgrid_eval.sources.town.sensors import Camera, View
+from semgrid_eval.sources.town.varied import fixed_conditions
 
 SEED = (5, 0, 2, 1)
 WIDTH, HEIGHT = 128, 64
@@ -51,12 +53,13 @@ def view(frame: int) -> View:
 
 def test_a_branch_that_goes_on_by_the_same_random_numbers_is_the_recording_byte_for_byte():
     camera = Camera(calibration(), WIDTH, HEIGHT)
-    rig = Rig(camera, "modelled", recording_streams(SEED)[-1])
+    conditions = replace(fixed_conditions(WIDTH, HEIGHT), calibration=calibration())
+    rig = Rig(conditions, "modelled", recording_streams(SEED)[-1])
     image = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     own = [rig.frame(frame, [(view(frame), image)]) for frame in range(7)]
 
     numbers = recording_streams(SEED)[-1].spawn(2)
-    errors = PictureErrors.begin("modelled", *numbers)
+    errors = PictureErrors.begin("modelled", Strengths(), *numbers)
     blank = np.zeros((HEIGHT, WIDTH), np.uint8)
     for _ in range(4):  # whatever the pictures show
         errors.add(blank, blank.astype(np.float32))

@@ -28,8 +28,10 @@ def frame_csv(frame: pd.DataFrame) -> str:
     Words that a spreadsheet would take for a formula have an apostrophe before them, as in spreadsheets themselves, and
     what cannot be printed is escaped.
     """
-    words = {name: frame[name].map(_word) for name in frame.columns if frame[name].dtype.kind in "OTU"}
-    safe = frame.assign(**{str(name): column for name, column in words.items()}).rename(columns=_word)
+    # By place: two columns of a table may have one name.
+    columns = [frame.iloc[:, at] for at in range(frame.shape[1])]
+    safe = pd.concat([each.map(_word) if each.dtype.kind in "OTU" else each for each in columns], axis=1)
+    safe.columns = [_word(name) for name in frame.columns]
     return safe.to_csv(index=False, float_format="%.6f", lineterminator="\n")
 
 
