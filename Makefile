@@ -18,7 +18,7 @@ REFERENCE_COMMANDS := "$(REFERENCE_LOGS)" \
 demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo
 
-reference: $(READY)  ## the paper's table on the simulated town, an hour and a half on two cores; continues where it was stopped
+reference: $(READY)  ## the paper's table on the simulated town: 15 trainings, time not measured yet; continues where it was stopped
 	for command in $(REFERENCE_COMMANDS); do $(BIN)/semgrid-eval $$command || exit 1; done
 	$(BIN)/python tools/reference_readme.py $(REFERENCE)/run $(REFERENCE_REPORT) $(REFERENCE_COMMANDS)
 

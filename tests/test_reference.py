@@ -13,6 +13,8 @@ from support.fake_run import make_fake_run
 
 from semgrid_eval.cli.main import cli
 from semgrid_eval.report.page.write import write_report
+from semgrid_eval.runs.matrix import load_matrix
+from semgrid_eval.runs.row import plan_units
 
 ROOT = Path(__file__).parents[1]
 
@@ -31,6 +33,16 @@ def test_the_recipe_converts_runs_and_reports_in_folders_that_are_given(tmp_path
     for command in commands:
         result = CliRunner().invoke(cli, [*command, "--no-such-option"])
         assert "No such option '--no-such-option'" in result.output, result.output
+
+
+def test_the_page_of_reports_names_the_preset_that_is_run_and_how_many_networks_it_trains():
+    (preset,) = re.findall(r"^REFERENCE_MATRIX \?= (\S+)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    units = plan_units(load_matrix(preset).rows, 0).values()
+    networks = sum(unit.row.facts.learns and unit.row.facts.family in ("ED", "RN") for unit in units)
+    text = " ".join((ROOT / "reports" / "README.md").read_text().split())
+    assert f"runs the preset `{preset}` on it" in text
+    assert f"networks are trained {networks} times" in text
+    assert f": {networks} trainings" in (ROOT / "Makefile").read_text()
 
 
 def test_the_readme_names_commands_scores_and_verdicts(tmp_path):

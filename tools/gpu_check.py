@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from shutil import copyfile
+from shutil import copyfile, rmtree
 from typing import Any, TypeVar
 
 import torch
@@ -106,9 +106,13 @@ def check_rates(place: Place) -> None:
 
 
 def check_paper(place: Place) -> None:
-    """Train and score the rows of the paper one after the other, the most telling ones first, as long as it may."""
+    """Train and score the rows of the paper one after the other, the most telling ones first, as long as it may.
+
+    It begins anew each time: what an earlier run has trained would cost this one nothing, and the price be too low.
+    """
     matrix = paper_matrix(smoke=place.smoke)
     count, run = processes_at_once(place.out / "rates.json"), run_folder(place.out)
+    rmtree(run, ignore_errors=True)
 
     def keep(*, complete: bool = False) -> None:
         place.keep(complete=complete, processes=count, rows=scores_of(run, REFERENCE), whole_preset=price_of_paper(run))
@@ -213,7 +217,7 @@ def table(path: Path) -> str:
     lines += [f"not measured: {what}" for what in found.get("failed", [])]
     lines += [row_line(name, row) for name, row in found.get("rows", {}).items()]
     if price := found.get("whole_preset"):
-        lines.append(f"whole preset, estimated: {price['hours']} h (goal: under {price['goal_hours']:g} h)")
+        lines.append(f"the paper's own rows, estimated: {price['hours']} h (goal: under {price['goal_hours']:g} h)")
     return "\n".join(lines)
 
 

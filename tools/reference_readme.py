@@ -1,6 +1,6 @@
 """Write the README of a reference report: what was run, on what, by which commands, and what came out.
 
-Example: python tools/reference_readme.py build/reference/run reports/reference "run paper-cpu --logs LOGS --out RUN"
+Example: python tools/reference_readme.py build/reference/run reports/reference "run reference --logs LOGS --out RUN"
 """
 
 import argparse

@@ -74,6 +74,10 @@ class _Guarded(Model):
 class _GuardedNetwork(_Guarded, Network):
     """Stands before a network of one's own, also while it is trained."""
 
+    def prepare(self, windows: WindowSet) -> None:
+        with self._guard():
+            super().prepare(windows)
+
     def forward(self, batch: WindowBatch) -> Tensor:
         # Windows in their order are views of what other rows see.
         own = replace(batch, shift_cells=batch.shift_cells.clone(), lead_s=batch.lead_s.clone())

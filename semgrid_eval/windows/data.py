@@ -83,13 +83,7 @@ def training_windows(frame_counts: Sequence[int], config: WindowConfig, leads_fr
         InputError: no recording is long enough.
     """
     leads = leads_frames or [config.lead_frames]
-    found = [
-        Window(recording, config.input_frames(target, lead), target)
-        for recording, count in enumerate(frame_counts)
-        for lead in leads
-        for target in range(config.span_frames + lead, count)
-    ]
-    return _plan(frame_counts, found, config.span_frames + min(leads) + 1)
+    return _every_target(frame_counts, config, [leads] * len(frame_counts), min(leads))
 
 
 def validation_windows(
@@ -97,20 +91,36 @@ def validation_windows(
 ) -> WindowPlan:
     """Return one window a recording, its target at `target_frame`, which rows of other shapes share (reading 3).
 
-    With `leads_frames`, recordings take one of these leads after the other.
+    Without `target_frame`, there is one for each target that a recording has. With `leads_frames`, recordings take one
+    of these leads after the other, of those that they are long enough for.
 
     Raises:
         InputError: no recording is long enough.
     """
     leads, target = leads_frames or [config.lead_frames], config.target_frame
     if target is None:
-        return training_windows(frame_counts, config, leads_frames)
+        fitting = ([lead for lead in leads if config.span_frames + lead < count] for count in frame_counts)
+        turns = [few[index % len(few) :][:1] if few else [] for index, few in enumerate(fitting)]
+        return _every_target(frame_counts, config, turns, min(leads))
     found = [
         Window(recording, config.input_frames(target, leads[recording % len(leads)]), target)
         for recording, count in enumerate(frame_counts)
         if target < count
     ]
     return _plan(frame_counts, found, target + 1)
+
+
+def _every_target(
+    frame_counts: Sequence[int], config: WindowConfig, leads: Sequence[Sequence[int]], shortest: int
+) -> WindowPlan:
+    """Plan the windows of every target for the leads of each recording; `shortest` is the least lead of all."""
+    found = [
+        Window(recording, config.input_frames(target, lead), target)
+        for recording, (count, each) in enumerate(zip(frame_counts, leads, strict=True))
+        for lead in each
+        for target in range(config.span_frames + lead, count)
+    ]
+    return _plan(frame_counts, found, config.span_frames + shortest + 1)
 
 
 def _plan(frame_counts: Sequence[int], windows: Sequence[Window], needed: int) -> WindowPlan:

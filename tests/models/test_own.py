@@ -38,6 +38,10 @@ class Small(Network):
         batch.shift_cells.zero_()
         return self.layer(input_planes(batch.past))
 
+class Unprepared(Network):
+    def prepare(self, windows):
+        return {}["prior"]
+
 class Counted(Model):
     family = "BL"
     files = ("table.txt",)
@@ -166,6 +170,11 @@ def test_model_that_cannot_be_made_or_fitted_is_named(own, batch):
         made(find_model(f"{own}:Silent")).predict(batch)
     with pytest.raises(InputError, match=r"own_models\.py:Silent: raised AttributeError: .*unheard_of"):
         find_model(f"{own}:Silent").check(Config(), None)
+
+
+def test_network_that_cannot_be_prepared_is_named(own):
+    with pytest.raises(InputError, match=r"own_models\.py:Unprepared: raised KeyError: 'prior'$"):
+        network(find_model(f"{own}:Unprepared")).prepare(None)
 
 
 def test_a_declared_file_that_is_missing_is_named_and_another_is_another_version(own):

@@ -59,6 +59,8 @@ def figures(out, part):
 
 
 def test_rates_then_rows_are_measured_scored_and_priced(carried, tmp_path):
+    earlier = tmp_path / "out-work" / "run" / "trainings" / "0"
+    earlier.mkdir(parents=True)
     code, printed = check(carried, tmp_path / "out", "rates:300", "paper:300")
     assert code == 0, printed
     rates, paper = figures(tmp_path / "out", "rates"), figures(tmp_path / "out", "paper")
@@ -76,8 +78,9 @@ def test_rates_then_rows_are_measured_scored_and_priced(carried, tmp_path):
         row["scores"]["mean_known"][0] - paper["rows"]["BL-Fuse"]["scores"]["mean_known"][0], abs=2e-4
     )
     assert paper["whole_preset"]["trainings"] == 200
+    assert not earlier.exists()  # what it trained would make the price too low
     assert "== paper: complete" in printed
-    assert "whole preset, estimated" in printed
+    assert "the paper's own rows, estimated" in printed
     with tarfile.open(tmp_path / "out" / "paper-run.tar.gz") as archive:
         assert "run/run.json" in archive.getnames()
     assert (tmp_path / "out" / "EncoderDecoder.safetensors").is_file()

@@ -33,6 +33,17 @@ def test_horizon_is_counted_from_the_newest_input():
     assert validation_windows([10], config).windows == (Window(0, (0, 2, 4), 8), Window(0, (1, 3, 5), 9))
 
 
+def test_recordings_take_one_lead_after_the_other_also_where_every_target_counts():
+    config = WindowConfig(inputs=1, target_frame=None)
+    plan = validation_windows([4, 4, 4, 2, 1], config, (1, 2))
+    by_recording = {index: [w for w in plan.windows if w.recording == index] for index in range(5)}
+    assert by_recording[0] == [Window(0, (target - 1,), target) for target in (1, 2, 3)]
+    assert by_recording[1] == [Window(1, (target - 2,), target) for target in (2, 3)]
+    assert by_recording[2] == [Window(2, (target - 1,), target) for target in (1, 2, 3)]
+    assert by_recording[3] == [Window(3, (0,), 1)]  # too short for the lead whose turn it is
+    assert plan.too_short == {4: "has 1 frames, and a window needs 2"}
+
+
 def test_short_recordings_are_named_and_the_others_go_on():
     plan = training_windows([10, 30, 11], WindowConfig())
     assert {window.recording for window in plan.windows} == {1, 2}

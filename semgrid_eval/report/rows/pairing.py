@@ -11,7 +11,8 @@ from semgrid_eval.report.rows.load import Row, comparable, key_of
 HEADLINE = "mean_known"
 DIFFERENCE_COLUMNS = ("static_known", "small_static", "vehicles", "small_dynamic", HEADLINE)
 _UNSET = "not set"
-_OF_TARGETS = ("grid.", "window.", "validation_window", "validation_split", "mask_mode")
+_OF_TARGETS = ("grid.", "window.", "validation_window", "validation_split", "train_split", "hold_out", "mask_mode")
+"""Starts of the keys of settings that decide the targets; with `hold_out`, what is scored is of `train_split`."""
 
 
 @dataclass(frozen=True)
@@ -148,5 +149,5 @@ def settings_but(row: Row, *left_out: str) -> tuple[tuple[str, str], ...]:
 
 def _text(value: object) -> str:
     if isinstance(value, list):
-        return ", ".join(str(part) for part in value)
+        return ", ".join(str(part) for part in value) or "none"
     return "none" if value is None else str(value).lower() if isinstance(value, bool) else str(value)

@@ -22,6 +22,12 @@ def test_the_settings_that_decide_the_targets_are_told_apart():
     assert changed_targets(before, after) == ["grid.spec.cell_m 0.5 to 0.25", "mask_mode exclude to off"]
 
 
+def test_what_is_held_out_and_of_which_split_decides_the_targets():
+    before = {"hold_out": [], "train_split": "train", "translate": True}
+    after = {"hold_out": ["town03"], "train_split": "extra", "translate": False}
+    assert changed_targets(before, after) == ["hold_out none to town03", "train_split train to extra"]
+
+
 def test_rows_are_alike_but_for_a_setting(run):
     rows = {row.name: row for row in load_runs([run])[0].rows}
     assert settings_but(rows["BL-DC"]) != settings_but(rows["BL-NT"])
