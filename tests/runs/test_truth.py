@@ -50,7 +50,7 @@ def folder_of(out, name):
 
 def right(out, name, file=results.SUMS_FILE):
     """The share of cells that a row has right, which is what the likeliest class is best at."""
-    counts = results.read_sums(folder_of(out, name), "iou", "all", file)[:, 0].sum(axis=0)
+    counts = results.read_sums(folder_of(out, name), "iou", "all", file=file)[:, 0].sum(axis=0)
     return np.trace(counts) / counts.sum()
 
 
@@ -79,11 +79,11 @@ def test_rows_say_that_they_are_told_of_the_truth(out):
 
 
 def test_the_second_target_is_what_most_draws_of_new_errors_say(out):
-    sums = results.read_sums(folder_of(out, "same"), "iou", "all", results.EXPECTED_FILE)[:, 0]
+    sums = results.read_sums(folder_of(out, "same"), "iou", "all", file=results.EXPECTED_FILE)[:, 0]
     assert (sums == sums * np.eye(10, dtype=int)).all(), "15 draws of new errors are that target itself"
     assert right(out, "BL-Fuse", results.EXPECTED_FILE) != right(out, "BL-Fuse")
     measured, expected = (
-        results.read_sums(folder_of(out, "BL-DC"), "iou", "all", file)
+        results.read_sums(folder_of(out, "BL-DC"), "iou", "all", file=file)
         for file in (results.SUMS_FILE, results.EXPECTED_FILE)
     )
     assert measured.sum(axis=-2).tolist() != expected.sum(axis=-2).tolist(), "each target has a mask of its own"
@@ -115,7 +115,7 @@ def test_processes_give_the_same_as_this_one(out, logs, tmp_path):
     for name in ("BL-DC", "top"):
         for file in (results.SUMS_FILE, results.EXPECTED_FILE):
             one, other = (
-                results.read_sums(folder_of(each, name), "iou", "all", file) for each in (out, tmp_path / "run")
+                results.read_sums(folder_of(each, name), "iou", "all", file=file) for each in (out, tmp_path / "run")
             )
             np.testing.assert_array_equal(one, other)
 
