@@ -16,13 +16,20 @@ from semgrid_eval.files import JSON_LIMIT_BYTES, READ_LIMIT_BYTES, atomic_file, 
 
 _MARK = b"semgrid-eval seal "
 _BLANK = b"0" * 64
-_SEAL = re.compile(re.escape(_MARK) + rb"([!#-~]{1,100}) ([0-9a-f]{64})")
+_OWNER = re.compile(r"[!#-~]{1,100}")
+_SEAL = re.compile(re.escape(_MARK) + b"(" + _OWNER.pattern.encode() + rb") ([0-9a-f]{64})")
 _NOBODY = "-"
 _JSON_KEY = "seal"
 
 
 def open_seal(owner: str = "") -> str:
-    """Return the text that content to be sealed holds, behind any other of its kind; `owner` is the id of a thing."""
+    """Return the text that content to be sealed holds, behind any other of its kind; `owner` is the id of a thing.
+
+    Raises:
+        ValueError: a reader could not find such an owner again.
+    """
+    if not _OWNER.fullmatch(owner or _NOBODY):
+        raise ValueError(f"{owner!r} cannot own a file: it is not 1 to 100 plain characters without spaces")
     return f"{_MARK.decode()}{owner or _NOBODY} {_BLANK.decode()}"
 
 

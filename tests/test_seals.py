@@ -60,3 +60,9 @@ def test_a_sealed_file_that_is_no_json_is_damaged(tmp_path):
         read_sealed_json(tmp_path / "a.json", "me")
     with pytest.raises(InputError, match="cannot be read"):
         read_sealed_json(tmp_path / "none.json", "me")
+
+
+@pytest.mark.parametrize("owner", ["my toy", "\u00fc", 'a"b', "a\n", "a" * 101])
+def test_an_owner_that_cannot_be_read_again_is_refused(owner):
+    with pytest.raises(ValueError, match="cannot own a file"):
+        open_seal(owner)

@@ -58,7 +58,7 @@ def build_grids(
     missing: list[Path] = []
     for log in logs:
         try:
-            ready[log] = _only(read_recordings(_cache_file(log, folder, config), log), sensors)
+            ready[log] = _only(_read(log, folder, config), sensors)
         except ResultError as error:
             missing.append(log)  # not made yet, or damaged
             if error.path and error.path.exists():
@@ -74,7 +74,7 @@ def build_grids(
             data.failed[str(log)] = failure.reason if isinstance(failure, WorkerDied) else failure
             continue
         # Workers leave their grids on disk: reading them costs less than sending them between processes.
-        ready[log] = _only(read_recordings(_cache_file(log, folder, config), log), sensors)
+        ready[log] = _only(_read(log, folder, config), sensors)
         data.built += 1
     data.recordings = [recording for log in logs for recording in ready.get(log, [])]
     return data
@@ -182,16 +182,24 @@ class _Stretch:
 
 def _build_and_keep(log: Path, folder: Path, config: GridConfig) -> str | None:
     try:
-        write_recordings(_cache_file(log, folder, config), build_log(log, config))
+        file, key = _cache_file(log, folder, config)
+        write_recordings(file, build_log(log, config), owner=key)
     except SemgridError as error:
         return _about(log, error)
     return None
 
 
-def _cache_file(log: Path, folder: Path, config: GridConfig) -> Path:
+def _read(log: Path, folder: Path, config: GridConfig) -> list[GridRecording]:
+    file, key = _cache_file(log, folder, config)
+    return read_recordings(file, log, owner=key)
+
+
+def _cache_file(log: Path, folder: Path, config: GridConfig) -> tuple[Path, str]:
+    """Return where the grids of a log are kept, and the digest of all that decides them, by which they are sealed."""
     with LogReader(log) as reader:
-        key = {"log": reader.digest, "config": config.model_dump(mode="json"), "format": FORMAT_VERSION}
-    return folder / f"{log.stem}-{digest_value(key)}.npz"
+        decided = {"log": reader.digest, "config": config.model_dump(mode="json"), "format": FORMAT_VERSION}
+    key = digest_value(decided)
+    return folder / f"{log.stem}-{key}.npz", key
 
 
 def _about(log: Path, error: SemgridError) -> str:

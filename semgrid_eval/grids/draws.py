@@ -76,16 +76,21 @@ class _ExactPictures:
 
     def number(self, stamp_ns: int) -> int:
         """Number the frame of a time."""
-        return self._frames[stamp_ns][1]
+        return self._frame(stamp_ns)[1]
 
     def at(self, stamp_ns: int) -> tuple[Pictures, int]:
         """Return the exact pictures of a time and the number of its frame."""
-        frame, number = self._frames[stamp_ns]
+        frame, number = self._frame(stamp_ns)
         if frame.exact_label_png is None or frame.exact_disparity_png is None:
             raise UnknownTruthError("has no exact pictures", path=self._log.path, field=f"frame at {stamp_ns} ns")
         label = decode_gray(frame.exact_label_png, bit_depth=8).astype(np.uint8, copy=False)
         disparity = decode_gray(frame.exact_disparity_png, bit_depth=16).astype(np.uint16, copy=False)
         return Pictures(label, disparity), number
+
+    def _frame(self, stamp_ns: int) -> tuple[CameraFrame, int]:
+        if stamp_ns not in self._frames:
+            raise UnknownTruthError(f"the target's camera has no frame at {stamp_ns} ns", path=self._log.path)
+        return self._frames[stamp_ns]
 
 
 def _camera_of(log: LogReader, config: GridConfig) -> str:

@@ -68,6 +68,9 @@ class MovedActors:
             for window, i in np.ndindex(times.inputs_ns.shape):
                 stamps_ns = int(times.inputs_ns[window, i]), int(times.target_ns[window])
                 first_ns = int(times.first_ns[window])
+                if stamps_ns[0] not in seen:
+                    fault = f"sensor {sensor} shows nothing at {stamps_ns[0]} ns, when the target's does"
+                    raise UnknownTruthError(fault, path=log.path)
                 points, ids = seen[stamps_ns[0]]
                 movers = truth.movers(points, ids, stamps_ns, first_ns)
                 found[window, s, i, 0] = _left(points, ids, movers, truth.yaw_rad(stamps_ns[0], first_ns), config)

@@ -37,8 +37,8 @@ class GridRecording:
     has_checksums: bool = True  # whether the log has them, so that damage can be seen
 
 
-def write_recordings(path: Path, recordings: Sequence[GridRecording]) -> None:
-    """Write the grids of a log's stretches, one after the other along their frames."""
+def write_recordings(path: Path, recordings: Sequence[GridRecording], *, owner: str) -> None:
+    """Write the grids of a log's stretches, one after the other along their frames, sealed for an `owner`."""
     first = recordings[0]
     truth = [recording.actors for recording in recordings if recording.actors is not None]
     arrays: dict[str, NDArray[np.generic]] = {
@@ -52,19 +52,19 @@ def write_recordings(path: Path, recordings: Sequence[GridRecording]) -> None:
     for name, axis in _ALONG_FRAMES.items():
         arrays[name] = np.concatenate([getattr(recording, name) for recording in recordings], axis=axis)
     arrays["actors"] = np.concatenate(truth) if truth else np.zeros((0, *first.grids.shape[2:]), np.uint8)
-    write_arrays(path, arrays, owner=_owner(path))
+    write_arrays(path, arrays, owner=owner)
 
 
-def read_recordings(path: Path, log: Path) -> list[GridRecording]:
+def read_recordings(path: Path, log: Path, *, owner: str) -> list[GridRecording]:
     """Read the grids of a log's stretches in one pass.
 
     Raises:
-        ResultError: the file is missing, damaged or lacks an array.
+        ResultError: the file is missing, damaged, lacks an array or belongs to another `owner`.
     """
     arrays = read_arrays(
         path,
         ("log", "has_checksums", "sensors", "names", "frames", "has_truth", *_ALONG_FRAMES, "actors"),
-        owner=_owner(path),
+        owner=owner,
     )
     digest, split, dataset, group, target = (str(value) for value in arrays["log"])
     ends, has_truth = np.cumsum(arrays["frames"])[:-1], arrays["has_truth"]
@@ -86,8 +86,3 @@ def read_recordings(path: Path, log: Path) -> list[GridRecording]:
         )
         for number, name in enumerate(arrays["names"])
     ]
-
-
-def _owner(path: Path) -> str:
-    """Return the digest in the name of a file, which says of what log and configuration it holds the grids."""
-    return path.stem.rpartition("-")[2]

@@ -1,5 +1,6 @@
 """What simulated logs know beyond what was measured, window by window: asked for, worked out, kept by digest."""
 
+import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,19 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.arrays import read_arrays, write_arrays
-from semgrid_eval.errors import ResultError
+from semgrid_eval.errors import LogError, ResultError
 from semgrid_eval.files import digest_value
+from semgrid_eval.grids.recording import FORMAT_VERSION
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.recording.png import encode
 from semgrid_eval.recording.types import CameraFrame
 
+_log = logging.getLogger(__name__)
 TRUTH_VERSION = 1
 """Counts changes to what is worked out; what was kept by another version is worked out again."""
 Stamps = NDArray[np.int64]
 Images = NDArray[np.uint8] | NDArray[np.uint16]
 _ARRAY = "truth"
 _UNFILTERED = (cv2.IMWRITE_PNG_COMPRESSION, 0, 19, 8)  # OpenCV names the last two, the filter and none, from 4.12 on
+
+
+def truth_versions() -> list[int]:
+    """Return the versions of what decides an answer: its own, and that of grids, as whose points votes are counted."""
+    return [TRUTH_VERSION, FORMAT_VERSION]
 
 
 @dataclass(frozen=True)
@@ -65,17 +73,23 @@ class Question:
     config: GridConfig
     times: WindowTimes
 
+    def key(self) -> str:
+        """Digest all that decides the answer; what is kept is sealed by it."""
+        asked = [type(self.truth).__name__, *self.truth.described(self.config)]
+        return digest_value([truth_versions(), self.digest, asked, self.truth.needed(self.times).described()])
+
     def file(self, folder: Path) -> Path:
         """Where the answer is kept."""
-        asked = [type(self.truth).__name__, *self.truth.described(self.config)]
-        key = [TRUTH_VERSION, self.digest, asked, self.truth.needed(self.times).described()]
-        return folder / f"{self.log.stem}-truth-{digest_value(key)}.npz"
+        return folder / f"{self.log.stem}-truth-{self.key()}.npz"
 
     def kept(self, folder: Path) -> NDArray[Any] | None:
-        """Read the answer where it is kept, None where it is not, or is damaged."""
+        """Read the answer where it is kept, None where it is not, or is damaged, which is said."""
+        file, key = self.file(folder), self.key()
         try:
-            return read_arrays(self.file(folder), (_ARRAY,))[_ARRAY]
-        except ResultError:
+            return read_answer(file, key)
+        except ResultError as error:
+            if file.exists():
+                _log.warning("%s; the truth is worked out again", error)
             return None
 
     def answer(self, folder: Path) -> NDArray[Any]:
@@ -83,14 +97,21 @@ class Question:
 
         Raises:
             UnknownTruthError: the log does not hold that truth.
-            LogError: it is damaged.
+            LogError: it is damaged, or another log than that of which is asked.
         """
         found = self.kept(folder)
         if found is None:
             with LogReader(self.log) as log:
+                if log.digest != self.digest:
+                    raise LogError(f"has digest {log.digest}, not {self.digest}", path=self.log)
                 found = self.truth.find(log, self.config, self.truth.needed(self.times))
-            write_arrays(self.file(folder), {_ARRAY: found})
+            write_arrays(self.file(folder), {_ARRAY: found}, owner=self.key())
         return found
+
+
+def read_answer(file: Path, key: str) -> NDArray[Any]:
+    """Read a kept answer; a ResultError says that it is missing, damaged or that to another question."""
+    return read_arrays(file, (_ARRAY,), owner=key)[_ARRAY]
 
 
 class FrameLog(LogReader):

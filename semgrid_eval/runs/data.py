@@ -24,7 +24,10 @@ from semgrid_eval.windows.grids import GridData, stack_recordings
 class GridSource(Protocol):
     """Where a run's grids come from, and what is known of their logs."""
 
-    cache: Path  # folder of what is worked out once and kept
+    @property
+    def cache(self) -> Path | None:
+        """Folder of what is worked out of the logs once and kept; None where there are no logs."""
+
     failed: dict[str, str]  # reasons, by the paths of logs that gave no grids
     records: dict[str, LogRecord]  # by the paths of logs
     log_of: dict[str, str]  # path of the log, by name of the recording

@@ -2,7 +2,7 @@
 
 ```
 FOLDER/packed.json           how the grids were made, and the record of each log
-FOLDER/<path of a log>.npz   its recordings, as grids are always kept
+FOLDER/<path of a log>.npz   its recordings, as grids are always kept, sealed by the log's digest
 ```
 """
 
@@ -13,16 +13,17 @@ from pathlib import Path
 import torch
 
 from semgrid_eval.config import Config, parse_config
-from semgrid_eval.errors import InputError
-from semgrid_eval.files import read_json, write_json
+from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.grids.recording import GridRecording, read_recordings, write_recordings
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.runs.data import RunData, grid_digest
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.results import LogRecord
+from semgrid_eval.seals import read_sealed_json, write_sealed_json
 from semgrid_eval.windows.grids import GridData, stack_recordings
 
 INDEX_FILE = "packed.json"
+_INDEX = "packed"  # owns the index, which has no id
 
 
 class PackedIndex(Config):
@@ -38,9 +39,13 @@ def pack_grids(data: RunData, config: GridConfig, folder: Path) -> None:
     data.identify()
     found = groupby(data.grids(config).recordings, key=lambda recording: data.log_of[recording.name])
     for log, recordings in found:
-        write_recordings(_file(folder, log), list(recordings))
-    index = PackedIndex(grid=config, logs=tuple(data.records.values()))
-    write_json(folder / INDEX_FILE, index.model_dump(mode="json"))
+        write_recordings(_file(folder, log), list(recordings), owner=data.records[log].digest)
+    write_index(folder, PackedIndex(grid=config, logs=tuple(data.records.values())))
+
+
+def write_index(folder: Path, index: PackedIndex) -> None:
+    """Write what a folder of packed grids says of itself."""
+    write_sealed_json(folder / INDEX_FILE, index.model_dump(mode="json"), _INDEX)
 
 
 def is_packed(folder: Path) -> bool:
@@ -57,8 +62,9 @@ class PackedGrids:
 
     def __init__(self, folder: Path, rows: Sequence[Row], device: torch.device) -> None:
         self._folder, self._device = folder, device
-        self.cache = folder
-        self._index = parse_config(PackedIndex, read_json(folder / INDEX_FILE), path=folder / INDEX_FILE)
+        self.cache = None
+        index = folder / INDEX_FILE
+        self._index = parse_config(PackedIndex, read_sealed_json(index, _INDEX), path=index)
         self._sensors = list(dict.fromkeys(sensor for row in rows for sensor in row.sensors))
         self._stacked: dict[str, GridData] = {}
         self.failed: dict[str, str] = {}
@@ -88,7 +94,10 @@ class PackedGrids:
         return self._stacked[split]
 
     def _read(self, log: LogRecord) -> list[GridRecording]:
-        found = read_recordings(_file(self._folder, log.path), self._folder / log.path)
+        file = _file(self._folder, log.path)
+        found = read_recordings(file, self._folder / log.path, owner=log.digest)
+        if other := {recording.digest for recording in found} - {log.digest}:
+            raise ResultError(f"holds the log {', '.join(other)}, not {log.digest}", path=file)
         self.log_of |= {recording.name: log.path for recording in found}
         return found
 

@@ -21,10 +21,10 @@ from semgrid_eval.runs.data import GridSource, RunData
 from semgrid_eval.runs.matrix import Matrix
 from semgrid_eval.runs.packed import PackedGrids, is_packed
 from semgrid_eval.runs.record import Clock, Outcome, run_record
-from semgrid_eval.runs.row import Row, Unit, plan_units
+from semgrid_eval.runs.row import Row, Unit, plan_units, units_of
 from semgrid_eval.runs.thumbnails import keep_pictures
 from semgrid_eval.runs.truth import work_out
-from semgrid_eval.runs.worker import Worker
+from semgrid_eval.runs.worker import Worker, asks_of_truth
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
 
@@ -76,9 +76,7 @@ def run_matrix(
 
     look_for_others()
     keep_record()
-    if options.pictures:
-        keep_pictures(out, _scored_windows(worker, rows), options.grid_executor, stage)
-    work_out(_questions(worker, rows), worker.scored_data.cache, options.grid_executor, stage)
+    _look_into_logs(worker, rows, matrix.seed, options)
     keys = list(wanted)
     with _unit_work(matrix, logs, out, options, worker) as (work, progress):
         progress(0, len(keys))
@@ -98,6 +96,16 @@ def _prepare(worker: Worker) -> None:
     for data in worker.data:
         data.prepare()
         data.identify()
+
+
+def _look_into_logs(worker: Worker, rows: Sequence[Row], first_seed: int, options: RunOptions) -> None:
+    """Keep pictures and work out what is asked of the truth, where there are logs and not grids alone."""
+    cache = worker.scored_data.cache
+    if cache is None:
+        return
+    if options.pictures:
+        keep_pictures(worker.out, _scored_windows(worker, rows), options.grid_executor, worker.stage)
+    work_out(_questions(worker, rows, first_seed), cache, options.grid_executor, worker.stage)
 
 
 def _lost(out: Path, outcomes: Mapping[str, Outcome]) -> dict[str, Outcome]:
@@ -129,11 +137,13 @@ def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[Windo
             yield worker.scored_windows(row)[0], row.grid
 
 
-def _questions(worker: Worker, rows: Iterable[Row]) -> Iterator[Question]:
-    """Return what rows ask of the truth."""
-    for row in rows:
+def _questions(worker: Worker, rows: Iterable[Row], first_seed: int) -> Iterator[Question]:
+    """Return what rows ask of the truth that have units to be worked on."""
+    for row in filter(asks_of_truth, rows):
         with suppress(SemgridError, torch.OutOfMemoryError):  # its units will tell
-            yield from worker.questions(row)
+            jobs = (worker.look(*unit) for _, unit in units_of(row, first_seed))
+            if any(worker.is_due(job) for job in jobs):
+                yield from worker.questions(row)
 
 
 def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stage: Stage) -> Worker:

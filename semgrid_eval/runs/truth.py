@@ -60,12 +60,14 @@ def _try(question: Question, cache: Path) -> None:
         question.answer(cache)
 
 
-def told(truth: Truth, windows: WindowSet, config: GridConfig, cache: Path) -> Tensor:
-    """Answer for all windows: (N, ...) on the device of the grids.
+def told(truth: Truth, windows: WindowSet, config: GridConfig, cache: Path | None) -> Tensor:
+    """Answer for all windows: (N, ...) on the device of the grids; there is no `cache` where there are no logs.
 
     Raises:
-        UnknownTruthError: a log does not hold that truth.
+        UnknownTruthError: a log does not hold that truth, or there are none, as beside packed grids.
     """
+    if cache is None:
+        raise UnknownTruthError("packed grids do not hold the truth, only their logs do")
     found: NDArray[Any] | None = None
     for chosen, question in parts_of(truth, windows, config):
         answer = question.answer(cache)
@@ -76,7 +78,7 @@ def told(truth: Truth, windows: WindowSet, config: GridConfig, cache: Path) -> T
     return torch.from_numpy(found).to(windows.data.grids.device)
 
 
-def expected_target(windows: WindowSet, config: GridConfig, cache: Path) -> NDArray[np.uint8] | None:
+def expected_target(windows: WindowSet, config: GridConfig, cache: Path | None) -> NDArray[np.uint8] | None:
     """Return what is measured on average at the windows' targets, (N, H, W); None where a log does not tell."""
     try:
         votes = told(EXPECTED, windows, config, cache)

@@ -13,7 +13,7 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import atomic_folder, digest_value
 from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
-from semgrid_eval.grids.truth import TRUTH_VERSION, Question
+from semgrid_eval.grids.truth import Question, truth_versions
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
 from semgrid_eval.models.checkpoint import read_history, write_history
 from semgrid_eval.models.device import choose_precision, seeded
@@ -101,8 +101,8 @@ class Worker:
         windows_id = id_of_windows(row, scored)
         training = self._training(resolved, row, seed, scored) if resolved.model.learns() else None
         config = {**row.identity(), "code": resolved.version}
-        if row.asked is not None or row.second_target is not None:
-            config["truth"] = TRUTH_VERSION
+        if asks_of_truth(row) and self.scored_data.cache is not None:
+            config["truth"] = truth_versions()
         learned = [training and training.id, seed]
         result_id = digest_value([results.FORMAT_VERSION, SCORING_VERSION, config, windows_id, learned])
         return Job(row, seed, resolved, result_id, config, scored, windows_id, training, left_out)
@@ -149,6 +149,10 @@ class Worker:
     def is_done(self, job: Job) -> bool:
         """Tell whether all that a job leaves lies in the run's folder."""
         return self._fault(job) is None
+
+    def is_due(self, job: Job) -> bool:
+        """Tell whether a job is to be worked on, if only since its model may read what is not known."""
+        return not (job.resolved.is_known and self.is_done(job))
 
     def _is_to_be_made(self, job: Job, folder: Path) -> bool:
         """Tell whether a result is not done, and say so where there is something in its place."""
@@ -269,6 +273,11 @@ class Worker:
                 _log.warning("%s; the windows are kept again", error)
             write_arrays(file, window_arrays(windows), owner=windows_id)
         self._kept.add(windows_id)
+
+
+def asks_of_truth(row: Row) -> bool:
+    """Tell whether a row's model or its second target asks for the truth."""
+    return row.asked is not None or row.second_target is not None
 
 
 def _keep_result(

@@ -239,7 +239,7 @@ def write_sums(folder: Path, sums: Sums, result_id: str = "", file: str = SUMS_F
     `file` is `EXPECTED_FILE` for that target.
     """
     arrays = {".".join(key): array for key, array in sums.items()}
-    write_arrays(folder / file, arrays, owner=result_id or folder.name)
+    write_arrays(folder / file, arrays, owner=_owner_of_sums(result_id or folder.name, file))
 
 
 def read_sums(
@@ -261,13 +261,19 @@ def check_sums(folder: Path, windows: int, *, has_expected: bool = False) -> Non
                 raise ResultError(fault, path=folder / file, field=".".join(key))
 
 
+def _owner_of_sums(result_id: str, file: str) -> str:
+    """Return whose seal the sums have: those against the expected target cannot stand in for the others."""
+    return f"{result_id}:expected" if file == EXPECTED_FILE else result_id
+
+
 def _read_sums(
     path: Path, keys: Sequence[tuple[str, str]], *, verify: bool = True
 ) -> dict[tuple[str, str], NDArray[np.int32]]:
     names = {key: ".".join(key) for key in keys}
     needed = tuple(name for key, name in names.items() if key[1] == "all")
     optional = tuple(name for name in names.values() if name not in needed)
-    found = read_arrays(path, needed, owner=path.parent.name, optional=optional, verify=verify)
+    owner = _owner_of_sums(path.parent.name, path.name)
+    found = read_arrays(path, needed, owner=owner, optional=optional, verify=verify)
     sums = {key: found[name] for key, name in names.items() if name in found}
     for (metric, partition), counted in sums.items():
         shape = (len(PARTITIONS[partition].regions), *METRICS[metric].shape)

@@ -1,5 +1,6 @@
 """Grids of draws go the way of measurements: without errors they are the measured grids themselves."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -85,3 +86,14 @@ def test_a_log_without_exact_pictures_says_so(logs, tmp_path):
     recording = build_log(path, CONFIG)[0]
     with LogReader(path) as log, pytest.raises(UnknownTruthError, match="holds no exact pictures"):
         Draws(3, continued=True).find(log, CONFIG, times(recording, (2, 5, 8)))
+
+
+@pytest.mark.parametrize("frames", ["input", "target"])
+def test_a_time_without_a_frame_of_the_targets_camera_is_named(logs, frames):
+    asked = times(build_log(logs["exact"], CONFIG)[0], (5, 10, 15))
+    late = {
+        "input": replace(asked, inputs_ns=asked.inputs_ns + 1),
+        "target": replace(asked, target_ns=asked.target_ns + 1),
+    }
+    with LogReader(logs["exact"]) as log, pytest.raises(UnknownTruthError, match=r"exact\.mcap: .* no frame at \d+ ns"):
+        Draws(3, continued=True).find(log, CONFIG, late[frames])

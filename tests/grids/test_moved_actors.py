@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.drawn_again import write_town_like
 from support.towns import small_plans
 from support.toy_world import street
 
@@ -66,4 +67,13 @@ def test_a_log_that_does_not_tell_whom_pixels_show_says_so(tmp_path):
     stamps_ns = build_log(path, CONFIG)[0].stamps_ns
     asked = WindowTimes(stamps_ns[:1], stamps_ns[[[2]]], stamps_ns[[8]])
     with LogReader(path) as log, pytest.raises(UnknownTruthError, match="which pixels show whom"):
+        MovedActors(("full",)).find(log, CONFIG, asked)
+
+
+def test_a_sensor_that_shows_nothing_at_an_inputs_time_is_named(tmp_path):
+    """As one does whose camera has a clock of its own, when the target's has another."""
+    path = write_town_like(tmp_path) / "val" / "toy2.mcap"
+    stamps_ns = build_log(path, CONFIG)[0].stamps_ns
+    asked = WindowTimes(stamps_ns[:1], stamps_ns[[[2]]] + 1, stamps_ns[[8]])
+    with LogReader(path) as log, pytest.raises(UnknownTruthError, match=r"toy2\.mcap: sensor full shows nothing at"):
         MovedActors(("full",)).find(log, CONFIG, asked)

@@ -19,8 +19,8 @@ def stretches():
 
 def test_stretches_come_back_as_they_were(tmp_path):
     written = stretches()
-    write_recordings(tmp_path / "kept.npz", written)
-    found = read_recordings(tmp_path / "kept.npz", Path("here.mcap"))
+    write_recordings(tmp_path / "kept.npz", written, owner="d")
+    found = read_recordings(tmp_path / "kept.npz", Path("here.mcap"), owner="d")
     assert len(found) == 3
     for one, same in zip(written, found, strict=True):
         for name in GridRecording.__dataclass_fields__:
@@ -29,8 +29,14 @@ def test_stretches_come_back_as_they_were(tmp_path):
 
 
 def test_a_file_that_lacks_an_array_is_refused(tmp_path):
-    write_recordings(tmp_path / "kept.npz", stretches())
+    write_recordings(tmp_path / "kept.npz", stretches(), owner="d")
     arrays = read_arrays(tmp_path / "kept.npz", ("log", "sensors", "names", "frames", "stamps_ns"))
-    write_arrays(tmp_path / "kept.npz", arrays, owner="kept")
+    write_arrays(tmp_path / "kept.npz", arrays, owner="d")
     with pytest.raises(ResultError, match="has no array has_checksums"):
-        read_recordings(tmp_path / "kept.npz", Path("here.mcap"))
+        read_recordings(tmp_path / "kept.npz", Path("here.mcap"), owner="d")
+
+
+def test_a_file_of_another_owner_is_refused(tmp_path):
+    write_recordings(tmp_path / "kept.npz", stretches(), owner="e")
+    with pytest.raises(ResultError, match=r"kept\.npz: belongs to another id \(e, not d\)"):
+        read_recordings(tmp_path / "kept.npz", Path("here.mcap"), owner="d")

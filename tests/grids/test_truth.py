@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from support.toy_world import street
 
+from semgrid_eval.errors import LogError
+from semgrid_eval.grids import truth as module
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import Question, WindowTimes
 from semgrid_eval.log.reader import LogReader
@@ -40,14 +42,41 @@ def question(tmp_path):
         return Question(Name(), path, log.digest, GridConfig(), TIMES)
 
 
-def test_what_was_worked_out_is_kept_and_a_damaged_file_is_made_again(question, tmp_path):
+def test_what_was_worked_out_is_kept_and_a_damaged_file_is_made_again(question, tmp_path, caplog):
     ASKED.clear()
     assert question.kept(tmp_path) is None
     assert [question.answer(tmp_path).tolist() for _ in range(2)] == [[5], [5]]
     assert ASKED == ["toy_1"]
+    assert not caplog.messages
     question.file(tmp_path).write_bytes(b"no arrays")
     assert question.answer(tmp_path).tolist() == [5]
     assert len(ASKED) == 2
+    (warning,) = caplog.messages
+    assert warning.startswith(str(question.file(tmp_path)))
+    assert warning.endswith("; the truth is worked out again")
+
+
+def test_the_answer_to_another_question_is_not_taken(question, tmp_path, caplog):
+    other = replace(question, truth=Name("b"))
+    other.answer(tmp_path)
+    other.file(tmp_path).rename(question.file(tmp_path))
+    assert question.kept(tmp_path) is None
+    assert "belongs to another id" in caplog.text
+
+
+def test_a_log_that_was_changed_is_not_asked(question, tmp_path):
+    changed = replace(question, digest="0" * 16)
+    with pytest.raises(LogError, match=rf"toy\.mcap: has digest {question.digest}, not 0{{16}}"):
+        changed.answer(tmp_path)
+    assert not changed.file(tmp_path).exists()
+
+
+@pytest.mark.parametrize("version", ["TRUTH_VERSION", "FORMAT_VERSION"])
+def test_what_another_version_worked_out_is_not_taken(question, tmp_path, monkeypatch, version):
+    """Votes go through projection and rasterising, whose version is that of grids."""
+    before = question.file(tmp_path)
+    monkeypatch.setattr(module, version, 99)
+    assert question.file(tmp_path) != before
 
 
 def test_another_question_has_another_file(question, tmp_path):

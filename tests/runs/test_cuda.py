@@ -9,13 +9,12 @@ from support.cuda import NEEDS_CUDA
 from support.recordings import random_recording
 
 from semgrid_eval.executors import InProcess, Processes
-from semgrid_eval.files import write_json
 from semgrid_eval.grids.recording import write_recordings
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.models.checkpoint import WEIGHTS_FILE
 from semgrid_eval.models.device import visible_gpus
 from semgrid_eval.runs.matrix import load_matrix
-from semgrid_eval.runs.packed import INDEX_FILE, PackedIndex
+from semgrid_eval.runs.packed import PackedIndex, write_index
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores import results
 
@@ -30,10 +29,10 @@ def grids(tmp_path):
     folder, logs = tmp_path / "packed", []
     for seed, split in enumerate(("train", "train", "val")):
         recording = random_recording(seed, size=64)
-        write_recordings(folder / f"{seed}.npz", [replace(recording, split=split)])
+        write_recordings(folder / f"{seed}.npz", [replace(recording, split=split)], owner=recording.digest)
         facts = {"name": recording.name, "path": f"{seed}.mcap", "digest": recording.digest}
         logs.append(results.LogRecord(**facts, split=split, dataset=recording.dataset))
-    write_json(folder / INDEX_FILE, PackedIndex(grid=GRID, logs=tuple(logs)).model_dump(mode="json"))
+    write_index(folder, PackedIndex(grid=GRID, logs=tuple(logs)))
     return folder
 
 

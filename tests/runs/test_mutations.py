@@ -10,6 +10,8 @@ from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores import results
 
+MADE_AGAIN = ["sums", "expected", "predictions", "history", "windows", "thumbnails", "grids", "truth", "weights"]
+
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
@@ -23,16 +25,16 @@ def test_no_changed_file_is_accepted(run, kind):
     assert not any(found)
 
 
-@pytest.mark.parametrize("kind", ["sums", "predictions", "history", "windows", "thumbnails", "grids", "weights"])
+@pytest.mark.parametrize("kind", MADE_AGAIN)
 def test_a_changed_file_is_made_again_alike_by_the_same_run(run, kind, caplog):
-    """Results go with what is changed, so that weights and grids are asked for again."""
+    """Results go with what is changed, so that weights, grids and the truth are asked for again."""
     pattern, _ = KINDS[kind]
     path = min(run.glob(pattern))
     whole = path.read_bytes()
     content = bytearray(whole)
     content[len(content) // 3] ^= 16
     path.write_bytes(content)
-    if kind == "weights":
+    if kind in ("weights", "truth"):
         for result in run.glob("results/*/sums.npz"):
             result.write_bytes(b"")
     options = RunOptions("cpu", run / "grids", "test", executor=InProcess())

@@ -1,6 +1,7 @@
 """Rows that are told of the truth, and the second target: on logs that tell, and on logs that do not."""
 
 import re
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,8 @@ from support.small_runs import run, write_logs
 
 from semgrid_eval.executors import Processes
 from semgrid_eval.grids.draws import Draws
+from semgrid_eval.grids.recording import FORMAT_VERSION
+from semgrid_eval.grids.truth import TRUTH_VERSION
 from semgrid_eval.models.model import Given
 from semgrid_eval.models.network import Network
 from semgrid_eval.models.registry import MODELS, find_model
@@ -121,6 +124,25 @@ def test_a_run_goes_on_where_it_was_and_finds_what_it_worked_out(out, logs):
     before = {path: path.stat().st_mtime_ns for path in out.parent.rglob("*.npz")}
     run([*PLAIN, *TOLD, SAME, MOVED], logs, out, second_target="expected")
     assert {path: path.stat().st_mtime_ns for path in out.parent.rglob("*.npz")} == before
+
+
+def test_nothing_is_worked_out_for_rows_that_are_done(out, logs, tmp_path):
+    for name in ("run", "run.yaml", "grids"):
+        copy = shutil.copytree if (out.parent / name).is_dir() else shutil.copyfile
+        copy(out.parent / name, tmp_path / name)
+    for kept in (tmp_path / "grids").glob("*-truth-*.npz"):
+        kept.unlink()
+    rows, grids = [*PLAIN, *TOLD, SAME, MOVED], tmp_path / "grids"
+    run(rows, logs, tmp_path / "run", second_target="expected")
+    assert not list(grids.glob("*-truth-*.npz"))
+    (folder_of(tmp_path / "run", "moved") / results.SUMS_FILE).unlink()
+    run(rows, logs, tmp_path / "run", second_target="expected")
+    assert len(list(grids.glob("*-truth-*.npz"))) == 4, "of two logs, what one row asks and its second target"
+
+
+def test_results_name_the_versions_that_their_truth_depends_on(out):
+    config = results.read_result(folder_of(out, "BL-DC")).config
+    assert config["truth"] == [TRUTH_VERSION, FORMAT_VERSION]
 
 
 def test_windows_carry_the_truth_for_who_asks_alone(logs, tmp_path, monkeypatch):

@@ -9,6 +9,8 @@ from support.windows import random_windows
 from semgrid_eval.errors import ResultError
 from semgrid_eval.scores.metrics.table import count_windows
 from semgrid_eval.scores.results import (
+    EXPECTED_FILE,
+    SUMS_FILE,
     LogRecord,
     ResultRecord,
     RunRecord,
@@ -61,6 +63,16 @@ def test_sums_of_a_metric_that_is_not_there_are_named(tmp_path):
     with pytest.raises(ResultError, match=r"has no array accuracy\.all"):
         check_sums(tmp_path, 3)
     assert not is_done(tmp_path)
+
+
+@pytest.mark.parametrize(("taken", "place"), [(EXPECTED_FILE, SUMS_FILE), (SUMS_FILE, EXPECTED_FILE)])
+def test_sums_against_one_target_cannot_stand_in_for_those_against_the_other(tmp_path, taken, place):
+    for file in (SUMS_FILE, EXPECTED_FILE):
+        write_sums(tmp_path, counted(), file=file)
+    check_sums(tmp_path, 3, has_expected=True)
+    (tmp_path / place).write_bytes((tmp_path / taken).read_bytes())
+    with pytest.raises(ResultError, match=f"{place}: belongs to another id"):
+        check_sums(tmp_path, 3, has_expected=True)
 
 
 def test_missing_sums_are_named(tmp_path):

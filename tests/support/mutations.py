@@ -13,12 +13,19 @@ from pathlib import Path
 
 import torch
 import yaml
-from support.small_runs import TINY, WINDOW, write_logs
+from support.drawn_again import write_town_like
+from support.small_runs import TINY, WINDOW
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.executors import InProcess
 from semgrid_eval.grids.recording import read_recordings
+from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.grids.truth import read_answer
 from semgrid_eval.models.checkpoint import read_header, read_history
+from semgrid_eval.progress import silent_stage
+from semgrid_eval.runs.data import RunData
 from semgrid_eval.runs.matrix import load_matrix
+from semgrid_eval.runs.packed import PackedGrids, pack_grids
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores import results
 from semgrid_eval.scores.thumbnails import read_pictures
@@ -33,11 +40,15 @@ KINDS: dict[str, tuple[str, Callable[[Path, str], object]]] = {
     "run record": ("run.json", lambda path, _: results.read_run(path.parent)),
     "result": ("results/*/result.json", lambda path, _: results.read_result(path.parent)),
     "sums": ("results/*/sums.npz", lambda path, _: results.check_sums(path.parent, 2)),
+    "expected": ("results/*/expected.npz", lambda path, _: results.check_sums(path.parent, 2, has_expected=True)),
     "predictions": ("results/*/predictions.npz", lambda path, _: results.read_predictions(path.parent)),
     "history": ("results/*/history.csv", lambda path, _: results.read_history(path.parent)),
     "windows": ("windows/*.npz", lambda path, _: results.read_windows(path.parent.parent, path.stem)),
     "thumbnails": ("pictures/*.npz", lambda path, _: read_pictures(path)),
-    "grids": ("grids/*.npz", lambda path, _: read_recordings(path, Path("log"))),
+    "grids": ("grids/toy?-[0-9a-f]*.npz", lambda path, _: read_recordings(path, Path("log"), owner=_key(path))),
+    "truth": ("grids/*-truth-*.npz", lambda path, _: read_answer(path, _key(path))),
+    "packed grids": ("packed/*/*.npz", lambda path, _: _packed(path.parents[1]).data(GridConfig(), path.parent.name)),
+    "packed index": ("packed/packed.json", lambda path, _: _packed(path.parent)),
     "weights": ("trainings/*/weights.safetensors", lambda path, owner: read_header(path, owner=owner)),
     "losses": ("trainings/*/history.csv", lambda path, owner: read_history(path, owner=owner)),
     "checkpoint": ("trainings/*/checkpoint.pt", lambda path, owner: read_sealed(path, owner)),
@@ -45,16 +56,30 @@ KINDS: dict[str, tuple[str, Callable[[Path, str], object]]] = {
 """Where each kind of file lies below a run, and what reads it, given whose seal it has."""
 
 
+def _key(path: Path) -> str:
+    """The digest in a file's name, of all that decides what it holds."""
+    return path.stem.rpartition("-")[2]
+
+
+def _packed(folder: Path) -> PackedGrids:
+    return PackedGrids(folder, load_matrix(str(folder.parent.parent / "m.yaml")).rows, torch.device("cpu"))
+
+
 def make_run(folder: Path) -> Path:
     """Run a small matrix that leaves a file of each kind."""
-    logs, out, file = write_logs(folder / "logs"), folder / "run", folder / "m.yaml"
-    file.write_text(yaml.safe_dump({"seed": 5, "models": TINY, "defaults": {"window": WINDOW}, "rows": ROWS}))
+    logs, out, file = write_town_like(folder / "logs"), folder / "run", folder / "m.yaml"
+    defaults = {"window": WINDOW, "second_target": "expected"}
+    file.write_text(yaml.safe_dump({"seed": 5, "models": TINY, "defaults": defaults, "rows": ROWS}))
+    matrix = load_matrix(str(file))
     unlink = Path.unlink
     Path.unlink = lambda path, **given: None if path.suffix == ".pt" else unlink(path, **given)  # keeps checkpoints
     try:
-        run_matrix(load_matrix(str(file)), logs, out, RunOptions("cpu", out / "grids", "test"))
+        run_matrix(matrix, logs, out, RunOptions("cpu", out / "grids", "test"))
     finally:
         Path.unlink = unlink
+    cpu = torch.device("cpu")
+    data = RunData(logs, out / "grids", matrix.rows, executor=InProcess(), device=cpu, stage=silent_stage)
+    pack_grids(data, GridConfig(), out / "packed")
     return out
 
 

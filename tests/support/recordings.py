@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.files import digest_value
 from semgrid_eval.grids.recording import GridRecording
 
 FRAME_NS = 58_823_529
@@ -22,7 +23,7 @@ def recording(
     return GridRecording(
         name=name,
         log=f"{name}.mcap",
-        digest=f"digest of {name}",
+        digest=digest_value(name),
         dataset="synthetic",
         split="train",
         sensors=sensors,

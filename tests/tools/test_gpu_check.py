@@ -15,7 +15,7 @@ from support.recordings import random_recording
 from semgrid_eval.files import write_json
 from semgrid_eval.grids.recording import write_recordings
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.runs.packed import INDEX_FILE, PackedIndex
+from semgrid_eval.runs.packed import PackedIndex, write_index
 from semgrid_eval.scores.results import LogRecord
 
 TOOL = Path(__file__).parents[2] / "tools" / "gpu_check.py"
@@ -30,10 +30,10 @@ def carried(tmp_path_factory):
         coarse = random_recording(seed, size=16, sensors=SENSORS, truth=True)
         fine = {name: np.kron(getattr(coarse, name), np.ones((8, 8), np.uint8)) for name in ("grids", "actors")}
         recording = replace(coarse, split=split, **fine)
-        write_recordings(folder / "grids" / f"{seed}.npz", [recording])
+        write_recordings(folder / "grids" / f"{seed}.npz", [recording], owner=recording.digest)
         facts = {"name": recording.name, "path": f"{seed}.mcap", "digest": recording.digest}
         logs.append(LogRecord(**facts, split=split, dataset=recording.dataset))
-    write_json(folder / "grids" / INDEX_FILE, PackedIndex(grid=GridConfig(), logs=tuple(logs)).model_dump(mode="json"))
+    write_index(folder / "grids", PackedIndex(grid=GridConfig(), logs=tuple(logs)))
     return folder
 
 
