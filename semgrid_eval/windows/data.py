@@ -220,7 +220,9 @@ class WindowSet:
 
     def disturbed(self, how: Disturbance | None, spec: GridSpec) -> "WindowSet":
         """Return the same windows with inputs that are wrong in some way, or right where none is given."""
-        return replace(self, disturb=None if how is None else Disturb(how, spec))
+        if how is None:
+            return self if self.disturb is None else replace(self, disturb=None)
+        return replace(self, disturb=Disturb(how, spec))
 
     def actors(self, chosen: slice) -> NDArray[np.uint8] | None:
         """Flag the cells near true actors, as `GridData.actors_near` does: -> (B, H, W)."""
