@@ -12,6 +12,7 @@ from torch.nn import functional as F
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config, merged, strictly
 from semgrid_eval.models.augment import AugmentConfig
+from semgrid_eval.models.certainty import Certainty
 from semgrid_eval.models.device import Precision, choose_precision, seeded
 from semgrid_eval.models.model import Given, Model, one_hot
 from semgrid_eval.windows.data import WindowBatch, WindowSet
@@ -68,6 +69,7 @@ class TrainingConfig(Config):
     schedule: ScheduleConfig = ScheduleConfig()
     loss: LossConfig = LossConfig()
     augment: AugmentConfig = AugmentConfig()  # of each batch, from the epoch's seed
+    calibrate: bool = False  # whether `models.certainty` follows, which changes no predicted class
 
     @model_validator(mode="after")
     def _epoch_holds_a_batch(self) -> Self:
@@ -117,6 +119,10 @@ class Network(Model, torch.nn.Module):
     random = True
     files = ()
 
+    def __init__(self, settings: Any, given: Given) -> None:  # noqa: ANN401 - of the class `Settings`
+        super().__init__(settings, given)
+        self.certainty = Certainty() if self.training_config.calibrate else None
+
     def prepare(self, windows: WindowSet) -> None:
         """Set what a training starts from by its windows, before the first update; most networks need nothing."""
 
@@ -134,11 +140,21 @@ class Network(Model, torch.nn.Module):
         training = self.training_config
         return training.optimizer.make(self.parameters(), training.schedule.learning_rate)
 
-    def predict(self, batch: WindowBatch) -> Tensor:
-        """Return class probabilities: (B, C, H, W) float32, computed in the precision of the training."""
+    def finish(self, windows: WindowSet) -> None:
+        """Set what the training's end is needed for, by the training windows: how sure it is, where that is asked."""
+        if self.certainty is not None:
+            self.certainty.fit(self.probabilities, windows)
+
+    def probabilities(self, batch: WindowBatch) -> Tensor:
+        """Return the softmax of its logits: (B, C, H, W) float32, computed in the precision of the training."""
         dtype = self.dtype_on(batch.past.device)
         with torch.inference_mode(), autocast(batch.past.device, dtype):
             return torch.as_tensor(self(batch)).float().softmax(dim=1)
+
+    def predict(self, batch: WindowBatch) -> Tensor:
+        """Return class probabilities (B, C, H, W) float32; with `calibrate`, scaled to the certainty of each cell."""
+        probabilities = self.probabilities(batch)
+        return probabilities if self.certainty is None else self.certainty(probabilities)
 
     @property
     def training_config(self) -> TrainingConfig:

@@ -40,6 +40,7 @@ class ResidualSettings(NetworkSettings):
         schedule=ScheduleConfig(learning_rate=2e-3, shape="cosine"),
         loss=LossConfig(jaccard=1.0),
         augment=AugmentConfig(flip=0.5),
+        calibrate=True,
     )
     widths: tuple[int, ...] = Field((32, 64, 96, 128), min_length=1, max_length=6)  # channels, each at half the size
     fine: int = Field(24, ge=0, le=256)  # channels at full resolution; 0 leaves that branch out

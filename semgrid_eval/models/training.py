@@ -107,6 +107,7 @@ class _Trainer:
             )
             history.append(EpochRecord(epoch + 1, updates, rate, loss, validated, seconds))
             store.keep(self._network, self._optimizer, history)
+        self._network.eval().finish(self._windows)
         store.finish(self._network, history)
         return history
 

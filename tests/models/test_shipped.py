@@ -34,10 +34,12 @@ def test_the_file_is_small_and_sealed_and_says_what_it_is():
     assert TownResidual.version == hashlib.sha256(path.read_bytes()).hexdigest()[:8]
 
 
-def test_it_answers_by_name_with_probabilities_that_depend_on_the_lead(batch):
+def test_it_answers_by_name_with_scores_that_depend_on_the_lead(batch):
     model = made(find_model("residual-town"), given(size=24, cell_m=CELL_M)).eval()
     answers = [model.predict(replace(batch, lead_s=batch.lead_s + later)) for later in (0.0, 0.6)]
-    torch.testing.assert_close(answers[0].sum(dim=1), torch.ones(2, 24, 24))
+    assert 0 < float(answers[0].amax(dim=1).min()) <= float(answers[0].max()) < 1
+    assert torch.equal(answers[0].argmax(dim=1), model.network.probabilities(batch).argmax(dim=1))
+    assert bool((model.network.certainty.slope < 1).all()), "a network with the Jaccard loss is too sure of itself"
     assert not torch.equal(*answers)
     assert torch.equal(answers[0], model.predict(batch))
 
