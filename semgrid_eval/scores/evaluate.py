@@ -66,7 +66,7 @@ def evaluate(
     for start in range(0, len(windows), batch):
         chosen = slice(start, start + batch)
         seen = windows.batch(chosen)
-        answer = _predict(model, seen)
+        answer = answered(model, seen)
         prediction, left_out = apply_mask(answer.prediction, seen.mask.cpu().numpy(), mask_mode)
         # What was to be seen, whichever way a row sees it.
         plain = windows.translate and not windows.disturb
@@ -104,12 +104,18 @@ def _against(
     target: NDArray[np.uint8], scored: ScoredWindows, answer: NDArray[np.uint8], mask_mode: MaskMode
 ) -> ScoredWindows:
     """Put another target in the place of what was measured, and make M anew: what was seen and it does not know."""
+    assert scored.inputs is not None
     seen = (scored.inputs != UNKNOWN).any(axis=(1, 2))
     prediction, left_out = apply_mask(answer, seen & (target == UNKNOWN), mask_mode)
     return replace(scored, target=target, prediction=prediction, left_out=left_out)
 
 
-def _predict(model: Model, seen: WindowBatch) -> Evaluation:
+def answered(model: Model, seen: WindowBatch) -> Evaluation:
+    """Ask a model about a batch, and measure the time; nothing is counted yet.
+
+    Raises:
+        InputError: the answer is malformed.
+    """
     if seen.target.is_cuda:  # what is still being gathered there is not the predictor's time
         torch.cuda.synchronize(seen.target.device)
     start_s = time.perf_counter()

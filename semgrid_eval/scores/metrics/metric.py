@@ -24,7 +24,9 @@ class ScoredWindows:
     prediction: Grid  # (N, H, W) class ids, the mask M treated as the row asks
     certainty: Grid  # (N, H, W) of the prediction, 255 = 1
     left_out: NDArray[np.bool_]  # (N, H, W) bool, cells that do not count
-    inputs: Grid  # (N, S, T, H, W) class ids, oldest first, moved into the target's place
+    # (N, S, T, H, W) class ids, oldest first, moved into the target's place; None where windows have no inputs of one
+    # time, as those of streams.
+    inputs: Grid | None
     actors: Grid | None  # (N, H, W) flags of true actors, `STANDING` and `MOVING`; None where no log holds the truth
     spec: GridSpec  # extent of the grids
 

@@ -7,7 +7,9 @@ from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.scores.metrics.metric import Partition, ScoredWindows
 
 
-def _number(scored: ScoredWindows) -> NDArray[np.int64]:
+def _number(scored: ScoredWindows) -> NDArray[np.int64] | None:
+    if scored.inputs is None:
+        return None
     seen = (scored.inputs != UNKNOWN).any(axis=1)  # (N, T, H, W)
     return np.where(seen[:, -1], 0, np.where(seen.any(axis=1), 1, 2))
 
