@@ -85,12 +85,12 @@ def test_without_latency_the_newest_grid_is_the_target(data):
 
 
 def test_six_frames_by_hand():
-    """A car drives right by a cell a frame; 1.5 frames of latency, one worker; in frame 4 the vehicle goes a cell ahead.
+    """A car drives right, a cell a frame; latency of 1.5 frames, one worker; the vehicle goes ahead by a cell in frame 4.
 
     The worker answers frame 0 at 1.5, frame 1 at 3, frame 3 at 4.5, frame 4 at 6. So at the captures of 0 to 5 the
     newest grid is: none, none, that of 0, of 1, of 1, of 3.
     """
-    grids = np.ones((1, 6, 4, 8), np.uint8)
+    grids = np.ones((1, 6, 8, 8), np.uint8)
     for frame in range(6):
         grids[0, frame, 2, frame] = 6
     forward_m = np.array([[0, 0]] * 4 + [[1, 0]] * 2)
@@ -103,20 +103,20 @@ def test_six_frames_by_hand():
     assert plan.capture_ns.tolist() == [0, 100, 300]
     assert (plan.publish_ns - plan.begin_ns == took).all()
     assert plan.first_answer_ns.tolist() == [took]
-    model = made(RepeatNewest, given(size=4, inputs=1))
-    spec = GridSpec(rows=4, columns=8, cell_m=1.0, agent_row=4, agent_column=4)
+    model = made(RepeatNewest, given(size=8, inputs=1))
+    spec = GridSpec(rows=8, columns=8, cell_m=1.0, agent_row=8, agent_column=4)
     counted = evaluate_stream(model, plan, spec=spec, move=True)
     found = counted.sums["iou", "all"][:, 0].sum(axis=0)
-    # Target road, 31 cells a frame, and one car; two misses. A grid that is two frames old has the car two cells behind
+    # Target road, 63 cells a frame, and one car; two misses. A grid that is two frames old has the car two cells behind
     # and one row too far down after the vehicle has gone a cell ahead, where the first row is then unknown.
     expected = np.zeros((CLASS_COUNT, CLASS_COUNT), np.int64)
-    expected[1, UNKNOWN] += 2 * 31
+    expected[1, UNKNOWN] += 2 * 63
     expected[6, UNKNOWN] += 2
     for car_aside, rows_lost in ((True, 0), (True, 0), (True, 1), (True, 1)):
         expected[1, 6] += car_aside
         expected[6, 1] += car_aside
         expected[1, UNKNOWN] += 8 * rows_lost
-        expected[1, 1] += 32 - 2 - 8 * rows_lost
+        expected[1, 1] += 64 - 2 - 8 * rows_lost
     np.testing.assert_array_equal(found, expected)
 
 
