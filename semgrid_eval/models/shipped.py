@@ -25,6 +25,7 @@ class TownResidual(Model, torch.nn.Module):
     words = "residual network trained on the simulated town, told the lead"
     family = "RN"
     files = ()
+    leads_s = (1 / 17, LEAD_LIMIT_S)
     version = "be616bd1"  # of the weights: the first digits of their file's SHA-256
 
     def __init__(self, settings: Config, given: Given) -> None:

@@ -11,6 +11,7 @@ from semgrid_eval.models.model import Model
 from semgrid_eval.runs.data import grid_digest
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
+from semgrid_eval.streams.plan import StreamPlan
 from semgrid_eval.windows.data import WindowSet
 
 SCORING_VERSION = 3  # counts changes to how windows are kept and scored; results of another version are made again
@@ -53,6 +54,7 @@ class Job:
     windows_id: str
     training: Training | None  # what is learned from, if anything
     left_out: dict[str, str]  # logs whose recordings are too short for the row's windows, and by how much
+    stream: StreamPlan | None = None  # of a row that is scored as its answers come; `scored` are these
 
 
 def id_of_windows(row: Row, scored: WindowSet) -> str:
@@ -60,14 +62,20 @@ def id_of_windows(row: Row, scored: WindowSet) -> str:
     return digest_value([SCORING_VERSION, GRIDS, scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
 
 
-def target_key(row: Row, scored: WindowSet) -> str:
-    """Digest what rows must share to be subtracted: target frames of which logs, their grids, mask mode and split."""
-    frames = scored.target_frames.cpu().numpy()
-    owners, places = scored.data.locate(frames)
-    digests = [scored.data.digests[owner] for owner in owners]
-    targets = sorted(zip(digests, scored.data.stamps_ns[frames].tolist(), places.tolist(), strict=True))
-    grid = row.grid.target_identity()
-    return digest_value([targets, grid, row.mask_mode, row.scored_split, list(CLASS_NAMES)])
+def target_key(job: Job) -> str:
+    """Digest what rows must share to be subtracted: target frames of which logs, their grids, mask mode and split.
+
+    Streams have another mask M, so they share theirs with streams alone.
+    """
+    row, data = job.row, job.scored.data
+    frames = job.stream.evaluated if job.stream else job.scored.target_frames.cpu().numpy()
+    owners, places = data.locate(frames)
+    digests = [data.digests[owner] for owner in owners]
+    targets = sorted(zip(digests, data.stamps_ns[frames].tolist(), places.tolist(), strict=True))
+    kind = ["stream"] if job.stream else []
+    return digest_value(
+        [targets, row.grid.target_identity(), row.mask_mode, row.scored_split, list(CLASS_NAMES), *kind]
+    )
 
 
 def window_records(windows: WindowSet, log_of: dict[str, str]) -> tuple[results.WindowRecord, ...]:

@@ -14,7 +14,8 @@ from semgrid_eval.grids.truth import Truth
 from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.registry import MODELS, find_model, installed_models, is_named
 from semgrid_eval.scores.evaluate import MaskMode
-from semgrid_eval.scores.results import RowFacts
+from semgrid_eval.scores.facts import RowFacts, StreamFacts
+from semgrid_eval.streams.config import StreamConfig
 from semgrid_eval.windows.data import WindowConfig
 from semgrid_eval.windows.disturb.kinds import AnyDisturbance
 
@@ -57,6 +58,8 @@ class Row(Config):
     # What is wrong with the inputs that are scored; training, targets and mask M are those of the undisturbed row. It
     # is not written where it is not set, so that ids stay.
     disturb: AnyDisturbance | None = Field(None, exclude_if=operator.not_)
+    # How its answers come in time, where it is scored by what is there at each time and not window by window.
+    stream: StreamConfig | None = Field(None, exclude_if=operator.not_)
 
     @field_validator("settings")
     @classmethod
@@ -80,6 +83,7 @@ class Row(Config):
             raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
         self._check_leads()
         self._check_disturb()
+        self._check_stream()
         if found := self.found_model():
             found.check(found.parse_settings(self.settings), self.given)
         return self
@@ -99,6 +103,18 @@ class Row(Config):
         if self.asked is not None:
             raise ValueError("disturb: a row that is told of the truth has no inputs to disturb")
         self.disturb.check(self.window.inputs)
+
+    def _check_stream(self) -> None:
+        if self.stream is None:
+            return
+        if self.disturb is not None or self.second_target is not None:
+            raise ValueError("stream: a stream has neither disturbed inputs nor a second target")
+        if self.asked is not None and self.stream.asked != "exact":
+            raise ValueError("stream.asked: what is told of the truth answers for each time of evaluation: exact")
+        model, asked = self.found_model(), self.stream.asked
+        one_lead = model is not None and model.learns() and not model.any_lead and self.train_leads is None
+        if one_lead and asked not in ("capture", "fixed"):
+            raise ValueError(f"stream.asked: {asked} needs a model that answers any lead, and this one learns one")
 
     @property
     def scored_window(self) -> WindowConfig:
@@ -156,7 +172,15 @@ class Row(Config):
             disturbed=self.disturb.words if self.disturb else "",
             uses_truth=self.asked is not None,
             bound=found.bound if found else "",
+            stream=self._stream_facts,
         )
+
+    @property
+    def _stream_facts(self) -> StreamFacts | None:
+        if self.stream is None:
+            return None
+        words = self.stream.model_copy(update={"added_ms": 0.0}).words
+        return StreamFacts(words=words, added_ms=self.stream.added_ms, asked=self.stream.asked)
 
     @property
     def label(self) -> str:
@@ -171,6 +195,8 @@ class Row(Config):
         ]
         if self.disturb:
             parts.append(self.disturb.words)
+        if self.stream:
+            parts[1:] = [f"{self.window.inputs} inputs", self.stream.words]
         return f"{self.name} ({', '.join(parts)})"
 
 

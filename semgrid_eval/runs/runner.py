@@ -26,7 +26,7 @@ from semgrid_eval.runs.thumbnails import keep_pictures
 from semgrid_eval.runs.truth import work_out
 from semgrid_eval.runs.worker import Worker, asks_of_truth
 from semgrid_eval.scores import results
-from semgrid_eval.windows.data import WindowSet
+from semgrid_eval.windows.data import WindowSet, first_of_each
 
 
 @dataclass(frozen=True)
@@ -131,10 +131,11 @@ def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:
 
 
 def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[WindowSet, GridConfig]]:
-    """Return the windows of rows that have some, and how their grids were made."""
+    """Return the windows of rows that have some, of streams one for each recording, and how their grids were made."""
     for row in rows:
         with suppress(SemgridError, torch.OutOfMemoryError):  # its units will tell
-            yield worker.scored_windows(row)[0], row.grid
+            windows = worker.scored_windows(row)[0]
+            yield (windows if row.stream is None else first_of_each(windows)), row.grid
 
 
 def _questions(worker: Worker, rows: Iterable[Row], first_seed: int) -> Iterator[Question]:

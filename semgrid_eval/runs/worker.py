@@ -1,11 +1,12 @@
 """Works on units of a run: one row with one seed, fitted if need be, scored, and kept under the digest of all of it."""
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import torch
 
 from semgrid_eval.arrays import write_arrays
@@ -26,47 +27,21 @@ from semgrid_eval.progress import Stage
 from semgrid_eval.runs.data import GridSource, grid_digest
 from semgrid_eval.runs.job import SCORING_VERSION, Job, Resolved, Training, id_of_windows, target_key, window_records
 from semgrid_eval.runs.row import Row
+from semgrid_eval.runs.selection import Selection, Wanted
+from semgrid_eval.runs.stream import block_records, identity_of, plan_row, stream_record
 from semgrid_eval.runs.truth import EXPECTED, expected_target, parts_of, told
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
+from semgrid_eval.streams.evaluate import evaluate_stream
+from semgrid_eval.streams.plan import StreamPlan
 from semgrid_eval.windows.data import (
-    WindowConfig,
-    WindowPlan,
     WindowSet,
-    select_windows,
     training_windows,
     validation_windows,
     window_arrays,
 )
 
 _log = logging.getLogger(__name__)
-WindowPlanner = Callable[[Sequence[int], WindowConfig, Sequence[int]], WindowPlan]
-
-
-@dataclass(frozen=True)
-class _Wanted:
-    """Which windows of a folder of logs."""
-
-    split: str
-    config: WindowConfig
-    plan: WindowPlanner
-    leads_frames: tuple[int, ...] = ()
-    groups: tuple[str, ...] = ()  # which are held out of the training, if any are
-    held_out: bool = False  # whether these are wanted, or the others
-
-    def recordings(self, groups: Sequence[str]) -> set[int]:
-        """Choose recordings by their groups.
-
-        Raises:
-            InputError: a group is not among them.
-        """
-        for group in self.groups:
-            if group not in groups:
-                found = ", ".join(sorted(set(groups))) or "none"
-                message = f"no recording of split {self.split!r} is of the group {group!r}, only {found}"
-                raise InputError(message, field="hold_out")
-        chosen = {index for index, group in enumerate(groups) if group in self.groups}
-        return chosen if self.groups and self.held_out else set(range(len(groups))) - chosen
 
 
 @dataclass(eq=False)
@@ -84,7 +59,7 @@ class Worker:
     threads: int  # of numeric libraries where the units are worked on, which may be another process
     example_seed: int  # of the results whose predictions are kept for a report's examples
     stage: Stage  # shows progress
-    _selected: dict[object, tuple[WindowSet, dict[int, str]]] = field(default_factory=dict, init=False)
+    _windows: Selection = field(default_factory=Selection, init=False)
     # Ids of the windows that are known to lie in the run's folder.
     _kept: set[str] = field(default_factory=set, init=False)
 
@@ -97,37 +72,46 @@ class Worker:
         """Resolve a row with one seed into its model, its windows, its training and the id of its result."""
         model = find_model(row.model)
         resolved = Resolved(model, model.parse_settings(row.settings), version_of(row.model))
-        scored, left_out = self.scored_windows(row)
-        windows_id = id_of_windows(row, scored)
+        stream = self.stream(row) if row.stream else None
+        scored, left_out = (stream.answers, dict[str, str]()) if stream else self.scored_windows(row)
+        windows_id = digest_value(stream.digest()) if stream else id_of_windows(row, scored)
         training = self._training(resolved, row, seed, scored) if resolved.model.learns() else None
-        config = {**row.identity(), "code": resolved.version}
+        config = {**row.identity(), **identity_of(row), "code": resolved.version}
         if asks_of_truth(row) and self.scored_data.cache is not None:
             config["truth"] = truth_versions()
         learned = [training and training.id, seed]
         result_id = digest_value([results.FORMAT_VERSION, SCORING_VERSION, config, windows_id, learned])
-        return Job(row, seed, resolved, result_id, config, scored, windows_id, training, left_out)
+        return Job(row, seed, resolved, result_id, config, scored, windows_id, training, left_out, stream)
+
+    def stream(self, row: Row) -> StreamPlan:
+        """Plan the stream of a row: over all recordings that are scored, from their first frames to their last."""
+        data = self.scored_data.data(row.grid, row.scored_split)
+        wanted = Wanted(row.scored_split, row.scored_window, validation_windows, (), row.hold_out, held_out=True)
+        return plan_row(row, data, sorted(wanted.recordings(data.groups)))
 
     def scored_windows(self, row: Row) -> tuple[WindowSet, dict[str, str]]:
-        """Select the windows on which a row is scored, and say why some logs give none."""
+        """Select the windows on which a row is scored, and say why some logs give none; of a stream its answers."""
+        if row.stream is not None:
+            return self.stream(row).answers, {}
         data = self.scored_data
-        wanted = _Wanted(row.scored_split, row.scored_window, validation_windows, (), row.hold_out, held_out=True)
-        undisturbed, too_short = self._select(data, row, wanted)
+        wanted = Wanted(row.scored_split, row.scored_window, validation_windows, (), row.hold_out, held_out=True)
+        undisturbed, too_short = self._windows.select(data, row, wanted)
         scored = undisturbed.disturbed(row.disturb, row.grid.spec)
         return scored, {data.log_of[scored.data.recordings[index]]: why for index, why in too_short.items()}
 
     def run(self, row: Row, seed: int | None) -> Job:
         """Make sure that the result of a row with one seed lies in the run's folder, and return what was resolved."""
         job = self.look(row, seed)
-        self._keep_windows(job.scored, job.windows_id)
+        self._keep_windows(job)
         folder = results.result_folder(self.out, job.result_id)
         if job.resolved.is_known and not self._is_to_be_made(job, folder):
             return job
         with seeded(seed or 0, self.device):
             model, train_seconds = self._fitted(job)
             evaluation = self._evaluated(job, model)
-        self._keep_windows(job.scored, job.windows_id)  # code of one's own may have removed them
+        self._keep_windows(job)  # code of one's own may have removed them
         record = self._result_record(job, model, train_seconds, evaluation)
-        _keep_result(folder, record, evaluation, self._history(job), with_predictions=self._shows(seed))
+        _keep_result(folder, record, evaluation, self._history(job), with_predictions=self._shows(job))
         return job
 
     def questions(self, row: Row) -> Iterator[Question]:
@@ -142,9 +126,26 @@ class Worker:
         expected = expected_target(scored, row.grid, cache) if row.second_target else None
         if row.asked is not None:
             scored = replace(scored, truth=told(row.asked, scored, row.grid, cache))
+        if job.stream is not None:
+            return self._streamed(job, model, replace(job.stream, answers=scored))
         score = partial(evaluate, model, scored, mask_mode=row.mask_mode, spec=row.grid.spec, expected=expected)
         with self.stage(f"score {row.name}") as progress:
             return score(progress=progress)
+
+    def _streamed(self, job: Job, model: Model, plan: StreamPlan) -> Evaluation:
+        """Score a model on the times of evaluation of its row's stream."""
+        row, nothing = job.row, np.empty(0, np.uint8)
+        assert row.stream is not None
+        with self.stage(f"score {row.name}") as progress:
+            found = evaluate_stream(
+                model,
+                plan,
+                spec=row.grid.spec,
+                move=row.stream.move,
+                mask_mode=row.mask_mode,
+                progress=progress,
+            )
+        return Evaluation(found.sums, nothing, nothing, found.seconds)
 
     def is_done(self, job: Job) -> bool:
         """Tell whether all that a job leaves lies in the run's folder."""
@@ -164,46 +165,31 @@ class Worker:
     def _fault(self, job: Job) -> str | None:
         folder = results.result_folder(self.out, job.result_id)
         with_history = self._history(job) is not None
-        return results.fault_of(folder, with_predictions=self._shows(job.seed), with_history=with_history)
+        return results.fault_of(folder, with_predictions=self._shows(job), with_history=with_history)
 
-    def _shows(self, seed: int | None) -> bool:
-        return seed in (None, self.example_seed)
+    def _shows(self, job: Job) -> bool:
+        return job.stream is None and job.seed in (None, self.example_seed)
 
     def _history(self, job: Job) -> Path | None:
         is_network = issubclass(job.resolved.model, Network)
         return job.training.folder / TRAINING_HISTORY_FILE if job.training and is_network else None
-
-    def _select(self, data: GridSource, row: Row, wanted: "_Wanted") -> tuple[WindowSet, dict[int, str]]:
-        """Select windows once for all seeds and rows that share them, with the reasons why recordings are too short."""
-        key = (data, grid_digest(row.grid), row.sensors, row.translate, wanted)
-        if key not in self._selected:
-            grids = data.data(row.grid, wanted.split)
-            planned = wanted.plan(grids.frame_counts, wanted.config, wanted.leads_frames)
-            kept = wanted.recordings(grids.groups)
-            chosen = [window for window in planned.windows if window.recording in kept]
-            windows = select_windows(grids, chosen, sensors=row.sensors, translate=row.translate)
-            too_short = {index: why for index, why in planned.too_short.items() if index in kept}
-            self._selected[key] = windows, too_short
-        return self._selected[key]
 
     def _watched(self, row: Row, scored: WindowSet) -> WindowSet | None:
         """Select the windows whose loss a training notes; they are the training logs' own, wherever it is scored.
 
         So one training serves the scores on all sorts of logs, and of disturbed inputs.
         """
-        if self.scored_data is self.training_data and not row.train_leads:
+        if self.scored_data is self.training_data and not row.train_leads and row.stream is None:
             return scored.disturbed(None, row.grid.spec)
-        wanted = _Wanted(
-            row.scored_split, row.window, validation_windows, row.leads_frames, row.hold_out, held_out=True
-        )
+        wanted = Wanted(row.scored_split, row.window, validation_windows, row.leads_frames, row.hold_out, held_out=True)
         try:
-            return self._select(self.training_data, row, wanted)[0]
+            return self._windows.select(self.training_data, row, wanted)[0]
         except InputError:  # no such logs among them, and none is needed
             return None
 
     def _training(self, resolved: Resolved, row: Row, seed: int | None, scored: WindowSet) -> Training:
-        wanted = _Wanted(row.train_split, row.window, training_windows, row.leads_frames, row.hold_out)
-        windows = self._select(self.training_data, row, wanted)[0]
+        wanted = Wanted(row.train_split, row.window, training_windows, row.leads_frames, row.hold_out)
+        windows = self._windows.select(self.training_data, row, wanted)[0]
         watched = self._watched(row, scored) if issubclass(resolved.model, Network) else None
         # All that decides what a model learns.
         settings, precision = resolved.settings, ""
@@ -244,17 +230,19 @@ class Worker:
     def _result_record(
         self, job: Job, model: Model, train_seconds: float | None, evaluation: Evaluation
     ) -> results.ResultRecord:
+        log_of = self.scored_data.log_of
         return results.ResultRecord(
             format_version=results.FORMAT_VERSION,
             id=job.result_id,
             facts=job.row.facts,
-            targets=target_key(job.row, job.scored),
+            targets=target_key(job),
             lead_s=round(float(job.scored.lead_s[:, -1].median()), 6),
+            stream=stream_record(job.stream) if job.stream else None,
             config=job.config,
             log_digests=tuple(sorted(set(job.scored.data.digests))),
             seed=job.seed,
             windows_id=job.windows_id,
-            windows=window_records(job.scored, self.scored_data.log_of),
+            windows=block_records(job.stream, log_of) if job.stream else window_records(job.scored, log_of),
             device=str(self.device),
             train_seconds=train_seconds,
             predict_seconds=round(evaluation.seconds, 6),
@@ -262,7 +250,11 @@ class Worker:
             has_expected=evaluation.expected_sums is not None,
         )
 
-    def _keep_windows(self, windows: WindowSet, windows_id: str) -> None:
+    def _keep_windows(self, job: Job) -> None:
+        """Keep what a report's examples are made from; a stream has none."""
+        windows, windows_id = job.scored, job.windows_id
+        if job.stream is not None:
+            return
         file = results.windows_file(self.out, windows_id)
         if windows_id in self._kept and file.exists():
             return

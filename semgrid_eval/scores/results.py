@@ -23,7 +23,7 @@ import re
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError, ResultError, first_line
+from semgrid_eval.scores.facts import RowFacts, StreamRecord
 from semgrid_eval.scores.metrics.table import METRICS, Sums
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.seals import read_sealed, read_sealed_json, write_sealed_json
@@ -75,26 +76,6 @@ class WindowRecord(Config):
         return re.sub(r"#\d+$", "", self.recording)
 
 
-class RowFacts(Config):
-    """What a row is, whatever it is called: differences, pairs, curves and examples are formed by this alone."""
-
-    model: str  # as the matrix names it: `ed`, `fuse`, `mine.py:Mine`
-    family: str  # of models, which figures draw alike: `ED`, `BL`, or that of a model of one's own
-    learns: bool  # whether it was fitted to training windows, by counts or by gradient
-    baseline: bool  # whether other rows are measured against it
-    inputs: int  # grids of the past, by sensor
-    step_frames: int  # frames between inputs
-    horizon_steps: int  # steps from the newest input to the target
-    sensors: tuple[str, ...]  # names of the inputs' sensors
-    translate: bool  # whether inputs are moved into the target's place
-    disturbed: str = ""  # what is wrong with its inputs, in words; empty where nothing is
-    uses_truth: bool = (
-        False  # whether it is told of the truth, so that it is a line beside the others and never the best
-    )
-    # Whether it is an end of the way that others are measured by: what anybody has, or what nobody exceeds.
-    bound: Literal["", "lower", "upper"] = ""
-
-
 class ResultRecord(Config):
     """One scored predictor with one seed.
 
@@ -116,6 +97,7 @@ class ResultRecord(Config):
     train_seconds: float | None
     predict_seconds: float
     parameters: int | None
+    stream: StreamRecord | None = None  # then its windows are blocks of time, and no predictions are kept
     has_expected: bool = False  # whether it is also scored against what is measured on average
 
 

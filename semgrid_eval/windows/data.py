@@ -272,6 +272,14 @@ def select_windows(
     )
 
 
+def first_of_each(windows: WindowSet) -> WindowSet:
+    """Return the first window of each recording."""
+    owners, _ = windows.data.locate(windows.target_frames.cpu().numpy())
+    chosen = np.unique(owners, return_index=True)[1]
+    parts = ("inputs", "target_frames", "shift_cells", "lead_s")
+    return replace(windows, truth=None, **{name: getattr(windows, name)[chosen] for name in parts})
+
+
 def window_arrays(windows: WindowSet, *, batch: int = 64) -> dict[str, NDArray[np.uint8] | NDArray[np.bool_]]:
     """Return what a run keeps: aligned inputs (N, S, T, H, W), target, mask and, with the truth, actors (N, H, W)."""
     aligned = replace(windows, translate=True)

@@ -85,7 +85,7 @@ def test_without_latency_the_newest_grid_is_the_target(data):
 
 
 def test_six_frames_by_hand():
-    """A car drives right, a cell a frame; latency of 1.5 frames, one worker; the vehicle goes ahead by a cell in frame 4.
+    """A car drives right, a cell a frame; latency of 1.5 frames, one worker; a cell of ego motion in frame 4.
 
     The worker answers frame 0 at 1.5, frame 1 at 3, frame 3 at 4.5, frame 4 at 6. So at the captures of 0 to 5 the
     newest grid is: none, none, that of 0, of 1, of 1, of 3.

@@ -1,0 +1,57 @@
+"""Which windows of which recordings a row trains on and is scored on, selected once for all rows that share them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.runs.data import GridSource, grid_digest
+from semgrid_eval.runs.row import Row
+from semgrid_eval.windows.data import WindowConfig, WindowPlan, WindowSet, select_windows
+
+WindowPlanner = Callable[[Sequence[int], WindowConfig, Sequence[int]], WindowPlan]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which windows of a folder of logs."""
+
+    split: str
+    config: WindowConfig
+    plan: WindowPlanner
+    leads_frames: tuple[int, ...] = ()
+    groups: tuple[str, ...] = ()  # which are held out of the training, if any are
+    held_out: bool = False  # whether these are wanted, or the others
+
+    def recordings(self, groups: Sequence[str]) -> set[int]:
+        """Choose recordings by their groups.
+
+        Raises:
+            InputError: a group is not among them.
+        """
+        for group in self.groups:
+            if group not in groups:
+                found = ", ".join(sorted(set(groups))) or "none"
+                message = f"no recording of split {self.split!r} is of the group {group!r}, only {found}"
+                raise InputError(message, field="hold_out")
+        chosen = {index for index, group in enumerate(groups) if group in self.groups}
+        return chosen if self.groups and self.held_out else set(range(len(groups))) - chosen
+
+
+class Selection:
+    """The windows that were selected."""
+
+    def __init__(self) -> None:
+        self._selected: dict[object, tuple[WindowSet, dict[int, str]]] = {}
+
+    def select(self, data: GridSource, row: Row, wanted: Wanted) -> tuple[WindowSet, dict[int, str]]:
+        """Select windows once for all seeds and rows that share them, with the reasons why recordings are too short."""
+        key = (data, grid_digest(row.grid), row.sensors, row.translate, wanted)
+        if key not in self._selected:
+            grids = data.data(row.grid, wanted.split)
+            planned = wanted.plan(grids.frame_counts, wanted.config, wanted.leads_frames)
+            kept = wanted.recordings(grids.groups)
+            chosen = [window for window in planned.windows if window.recording in kept]
+            windows = select_windows(grids, chosen, sensors=row.sensors, translate=row.translate)
+            too_short = {index: why for index, why in planned.too_short.items() if index in kept}
+            self._selected[key] = windows, too_short
+        return self._selected[key]
