@@ -167,6 +167,7 @@ class Row(Config):
             inputs=self.window.inputs,
             step_frames=self.scored_window.step_frames,
             horizon_steps=self.scored_window.horizon_steps,
+            lead_ms=self.scored_window.lead_ms,
             sensors=self.sensors,
             translate=self.translate,
             disturbed=self.disturb.words if self.disturb else "",
@@ -180,18 +181,22 @@ class Row(Config):
         if self.stream is None:
             return None
         words = self.stream.model_copy(update={"added_ms": 0.0}).words
-        return StreamFacts(words=words, added_ms=self.stream.added_ms, asked=self.stream.asked)
+        stream = self.stream
+        measured = stream.latency_ms is None
+        return StreamFacts(words=words, added_ms=stream.added_ms, measured=measured, asked=stream.asked)
 
     @property
     def label(self) -> str:
         """Name and, in words, what the row does; the horizon is always said (reading 2)."""
         found = self.found_model()
-        horizon = self.scored_window.horizon_steps
+        horizon, lead_ms = self.scored_window.horizon_steps, self.scored_window.lead_ms
         parts = [
             found.in_words(found.parse_settings(self.settings)) if found else self.model,
             "moved to the target's time" if self.translate else "not moved",
             f"{self.window.inputs} inputs",
-            f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead",
+            f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead"
+            if lead_ms is None
+            else f"{lead_ms:g} ms ahead",
         ]
         if self.disturb:
             parts.append(self.disturb.words)

@@ -7,6 +7,8 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.runs.data import GridSource, grid_digest
 from semgrid_eval.runs.row import Row
 from semgrid_eval.windows.data import WindowConfig, WindowPlan, WindowSet, select_windows
+from semgrid_eval.windows.grids import GridData
+from semgrid_eval.windows.lead import frames_of
 
 WindowPlanner = Callable[[Sequence[int], WindowConfig, Sequence[int]], WindowPlan]
 
@@ -37,6 +39,13 @@ class Wanted:
         return chosen if self.groups and self.held_out else set(range(len(groups))) - chosen
 
 
+def wanted_lead(config: WindowConfig, grids: GridData) -> tuple[int, ...]:
+    """Return the lead in frames where it is given in ms, by the rate of the first recording; nothing where not."""
+    if config.lead_ms is None:
+        return ()
+    return (frames_of(config.lead_ms, grids.stamps_ns[: grids.first_frames[1]]),)
+
+
 class Selection:
     """The windows that were selected."""
 
@@ -48,7 +57,8 @@ class Selection:
         key = (data, grid_digest(row.grid), row.sensors, row.translate, wanted)
         if key not in self._selected:
             grids = data.data(row.grid, wanted.split)
-            planned = wanted.plan(grids.frame_counts, wanted.config, wanted.leads_frames)
+            leads = wanted.leads_frames or wanted_lead(wanted.config, grids)
+            planned = wanted.plan(grids.frame_counts, wanted.config, leads)
             kept = wanted.recordings(grids.groups)
             chosen = [window for window in planned.windows if window.recording in kept]
             windows = select_windows(grids, chosen, sensors=row.sensors, translate=row.translate)

@@ -10,6 +10,7 @@ class StreamFacts(Config):
 
     words: str  # in words, without what is added to the latency
     added_ms: float  # on top of the latency of its chain
+    measured: bool  # whether its latency was measured, by a profile or by who made the answers
     asked: str  # the time that a grid is for, as `streams.config` names it
 
 
@@ -36,6 +37,7 @@ class RowFacts(Config):
     inputs: int  # grids of the past, by sensor
     step_frames: int  # frames between inputs
     horizon_steps: int  # steps from the newest input to the target
+    lead_ms: float | None = None  # instead of these, where it is set in ms
     sensors: tuple[str, ...]  # names of the inputs' sensors
     translate: bool  # whether inputs are moved into the target's place
     disturbed: str = ""  # what is wrong with its inputs, in words; empty where nothing is

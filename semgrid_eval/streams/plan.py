@@ -15,6 +15,7 @@ from semgrid_eval.streams.leads import Drive, times_asked
 from semgrid_eval.streams.schedule import NONE, Times, many_workers, newest_at, one_worker
 from semgrid_eval.windows.data import WindowConfig, WindowSet
 from semgrid_eval.windows.grids import GridData, shift_in_cells
+from semgrid_eval.windows.lead import frames_of
 
 BLOCK_S = 0.5
 """Length of what is counted together; the warm-up is rounded up to whole blocks."""
@@ -143,7 +144,8 @@ class _Part:
         local = evaluated_frames(self._stamps_ns, config.rate_hz)
         evaluated_ns = self._stamps_ns[local]
         used = newest_at(evaluated_ns, self._stamps_ns[self.answers.frame], self.answers.publish_ns)
-        drive = Drive(self._stamps_ns, evaluated_ns, used, window.lead_frames)
+        lead = window.lead_frames if window.lead_ms is None else frames_of(window.lead_ms, self._stamps_ns)
+        drive = Drive(self._stamps_ns, evaluated_ns, used, lead)
         for_ns = times_asked(config.asked, self.answers, drive, limits_ns)
         answered = self.answers.publish_ns.min(initial=int(self._stamps_ns[-1]))
         self.first_answer_ns = int(answered) - int(self._stamps_ns[0])

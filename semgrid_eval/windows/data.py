@@ -1,14 +1,15 @@
 """Windows: which frames are inputs and target (readings 1 to 3), and batches of them, moved (T2) and masked."""
 
 import hashlib
+import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from torch import Tensor
 
 from semgrid_eval.config import Config
@@ -17,6 +18,7 @@ from semgrid_eval.files import DIGEST_CHARACTERS
 from semgrid_eval.grids.spec import GridSpec
 from semgrid_eval.windows.disturb.disturbance import Disturbance, Inputs
 from semgrid_eval.windows.grids import GridData, covered_without_truth, shift_grids, shift_in_cells
+from semgrid_eval.windows.lead import lead_from
 
 
 class WindowConfig(Config):
@@ -25,6 +27,10 @@ class WindowConfig(Config):
     inputs: int = Field(default=2, ge=1)
     step_frames: int = Field(default=5, ge=1)
     horizon_steps: int = Field(default=1, ge=1)
+    # Time to the target, to the nearest frame, instead of whole steps; `from FILE` takes the best one of a report.
+    lead_ms: Annotated[float, BeforeValidator(lead_from)] | None = Field(
+        None, gt=0, le=60_000, exclude_if=operator.not_
+    )
     target_frame: int | None = Field(default=25, ge=0)  # the one target of a validation recording; None takes every one
 
     @property
@@ -34,7 +40,7 @@ class WindowConfig(Config):
 
     @property
     def lead_frames(self) -> int:
-        """Frames from the newest input to the target."""
+        """Frames from the newest input to the target, where these are whole steps."""
         return self.horizon_steps * self.step_frames
 
     @property
@@ -49,7 +55,9 @@ class WindowConfig(Config):
 
     @model_validator(mode="after")
     def _inputs_lie_in_recording(self) -> Self:
-        if self.target_frame is not None and self.target_frame < self.reach_frames:
+        if self.lead_ms is not None and self.horizon_steps != 1:
+            raise ValueError("give one of lead_ms and horizon_steps")
+        if self.lead_ms is None and self.target_frame is not None and self.target_frame < self.reach_frames:
             shape = f"inputs {self.inputs}, step_frames {self.step_frames} and horizon_steps {self.horizon_steps}"
             raise ValueError(
                 f"target_frame {self.target_frame} is too early: {shape} reach back {self.reach_frames} frames"
@@ -102,6 +110,9 @@ def validation_windows(
         fitting = ([lead for lead in leads if config.span_frames + lead < count] for count in frame_counts)
         turns = [few[index % len(few) :][:1] if few else [] for index, few in enumerate(fitting)]
         return _every_target(frame_counts, config, turns, min(leads))
+    if target < config.span_frames + max(leads):
+        reach = config.span_frames + max(leads)
+        raise InputError(f"target_frame {target} is too early: inputs and lead reach back {reach} frames")
     found = [
         Window(recording, config.input_frames(target, leads[recording % len(leads)]), target)
         for recording, count in enumerate(frame_counts)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.report.estimates.division import Division, of_cells, of_windows
+from semgrid_eval.report.estimates.streams import warm_up
 from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import Result, Row, Run
 from semgrid_eval.scores.regions.table import PARTITIONS
@@ -54,4 +55,4 @@ def _paces(result: Result, kept: RunThumbnails) -> NDArray[np.int64]:
 
 def divisions(runs: Sequence[Run]) -> list[Division]:
     """Return the divisions of cells, all cells first, and then those of windows."""
-    return [*map(of_cells, PARTITIONS.values()), paces(runs)]  # to add kinds of windows, add them here
+    return [*map(of_cells, PARTITIONS.values()), paces(runs), warm_up(runs)]  # to add kinds of windows, add them here

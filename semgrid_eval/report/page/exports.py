@@ -1,7 +1,7 @@
 """What a report is written from, and its files beside the page: long tables, the page's own, figures, report.json."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,11 +25,14 @@ from semgrid_eval.report.estimates.bootstrap import (
     score_regions,
 )
 from semgrid_eval.report.estimates.division import of_cells
+from semgrid_eval.report.estimates.leads import best_leads, lead_series
 from semgrid_eval.report.estimates.paces import divisions
+from semgrid_eval.report.estimates.streams import WARM, Strategy, strategies
 from semgrid_eval.report.estimates.way import Way, against_expected, order_of, ways
 from semgrid_eval.report.figures import categories, curves, settings
 from semgrid_eval.report.figures.curves import calibration_frame, timing_frame, training_frame
 from semgrid_eval.report.figures.settings import settings_frame
+from semgrid_eval.report.figures.streams import stream_frame, stream_plots
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
 from semgrid_eval.report.rows.load import Row, Run
@@ -40,6 +43,7 @@ from semgrid_eval.report.tables.formats.latex import as_latex
 from semgrid_eval.report.tables.formats.markdown import as_markdown
 from semgrid_eval.report.tables.numbers import finite
 from semgrid_eval.report.tables.scores import division_tables, score_tables
+from semgrid_eval.report.tables.streams import lead_table, stream_table, wins_table
 from semgrid_eval.report.tables.table import Table
 from semgrid_eval.report.tables.truth import expected_table, order_sentence, way_table
 from semgrid_eval.report.tables.values import reference_scores
@@ -48,6 +52,8 @@ from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.tidy import FIGURE_COLUMNS
 
+LEADS_FILE = "leads.json"
+"""The best leads of streams, which a row's `lead_ms: from FILE` reads."""
 PAGE, RECORD = "index.html", "report.json"
 FILES = "files"
 """The key in report.json of the names of all files of the report."""
@@ -83,17 +89,15 @@ class Material:
     runs: Sequence[Run]
     resampling: Resampling
     everything: Everything
+    scores: Scores  # the IoU of all cells, of the rows that stand in the tables of all rows
     findings: Sequence[Finding]
     tables: Mapping[str, Table | None]  # of the IoU of all cells
     parts: Mapping[str, Sequence[Table]]  # of every metric, by division
     figures: Mapping[str, Sequence[Plot]]
     expected: Everything  # IoU against what is measured on average, of the rows that are scored so
     order: str  # whether the order of rows is another one there, in a sentence
-
-    @property
-    def scores(self) -> Scores:
-        """The IoU of all cells."""
-        return everywhere(self.everything, "iou")
+    streams: Sequence[Strategy] = ()
+    best_leads: Mapping[str, float] = field(default_factory=dict)  # in ms by category
 
     @cached_property
     def records(self) -> Records:
@@ -105,6 +109,8 @@ def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
     """Work out everything that a report shows."""
     rows, parts = [row for each in runs for row in each.rows], divisions(runs)
     everything = score_all(rows, parts, resampling)
+    streams, moving = strategies(everywhere(everything, "iou")), everything["iou"]["actors"].get("moving", {})
+    whole, everything = everything, shown_rows(everything, streams)
     scores = everywhere(everything, "iou")
     findings = find(runs, scores, everything["iou"]["actors"])
     tables = score_tables(scores, [each.tag for each in runs])
@@ -114,14 +120,47 @@ def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
         "training": curves.training_plots(rows),
         "calibration": curves.calibration_plots(everywhere(everything, "calibration")),
         "settings": settings.settings_plots(scores),
+        "streams": stream_plots(streams, moving),
     }
+    warm = everything["iou"]["warm_up"].get(WARM, {})
+    leads = lead_series(scores)
+    tables |= {"streams": stream_table(streams, warm, moving), "stream_wins": wins_table(streams)}
+    tables |= {"stream_leads": lead_table(leads)}
     tables |= {"way": way_table(scores, everything["iou"]["actors"].get("moving", {}), rows), "expected": None}
     expected, order = score_expected(rows, resampling), ""
     if scored := everywhere(expected, "iou"):
         found = order_of(scores, scored, main_group([entry.row for entry in scored.values()])[0].targets)
         tables["expected"], order = expected_table(scored, found), order_sentence(scores, scored, found)
     in_parts = division_tables(everything, parts)
-    return Material(runs, resampling, everything, findings, tables, in_parts, figures, expected, order)
+    return Material(
+        runs,
+        resampling,
+        whole,
+        scores,
+        findings,
+        tables,
+        in_parts,
+        figures,
+        expected,
+        order,
+        tuple(streams),
+        best_leads(leads),
+    )
+
+
+def shown_rows(everything: Everything, streams: Sequence[Strategy]) -> Everything:
+    """Leave out the rows that differ from others in their latency alone: they have a section of their own."""
+    hidden = {entry.row.name for each in streams for entry in each.entries if entry is not each.measured}
+    return {
+        metric: {
+            division: {
+                region: {name: entry for name, entry in scores.items() if name not in hidden}
+                for region, scores in parts.items()
+            }
+            for division, parts in divisions.items()
+        }
+        for metric, divisions in everything.items()
+    }
 
 
 def score_expected(rows: Sequence[Row], resampling: Resampling) -> Everything:
@@ -138,6 +177,7 @@ def write_numbers(folder: Path, material: Material) -> None:
         "expected": summary_frame(division_records(material.expected)),
         "scores": seed_frame(material.everything),
         "findings": finding_frame(material.findings),
+        "streams": stream_frame(material.streams),
         "calibration": calibration_frame(everywhere(material.everything, "calibration")),
         "settings": settings_frame(material.scores),
         "training": training_frame([row for run in runs for row in run.rows]),
@@ -148,6 +188,8 @@ def write_numbers(folder: Path, material: Material) -> None:
         write_text(folder / f"{name}.csv", frame_csv(frame))
     for run in runs:
         write_text(folder / matrix_file(run, runs), matrix_text(run))
+    if material.best_leads:
+        write_json(folder / LEADS_FILE, {"lead_ms": dict(material.best_leads)})
 
 
 def write_record(folder: Path, material: Material) -> None:

@@ -26,6 +26,7 @@ from semgrid_eval.report.rows.load import Row, Run, key_of, load_runs
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, Headline, headline, verdict
 from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, plural, signed
 from semgrid_eval.report.tables.scores import confusion_table
+from semgrid_eval.report.tables.streams import stream_sentence
 from semgrid_eval.report.tables.truth import way_sentence
 
 _SEED = 20190623  # any number does; a fixed one gives the same run the same intervals
@@ -104,7 +105,8 @@ def render_page(material: Material) -> str:
     runs, scores = material.runs, material.scores
     found = headline(scores)
     rows = [entry.row for entry in scores.values()]
-    examples = example_groups(runs, rows, found)
+    pictured = [row for row in rows if not row.is_stream]  # streams keep no predictions
+    examples = example_groups(runs, pictured, None if found is None or found.best.is_stream else found)
     shown = () if found is None else filter(None, (found.best, found.reference or found.rival))
     loader, strict = PackageLoader("semgrid_eval.report"), StrictUndefined
     environment = Environment(
@@ -121,6 +123,7 @@ def render_page(material: Material) -> str:
         resampled=material.resampling.sentence,
         tables=material.tables,
         order=material.order,
+        streams=stream_sentence(material.streams),
         parts=material.parts,
         about_settings=sum(not in_paper(e.row.record.name) for e in scores.values()) > len(scores) / 2,
         findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
@@ -130,8 +133,8 @@ def render_page(material: Material) -> str:
         legend=(*CLASS_LEGEND, MASK_LEGEND),
         right_legend=RIGHT_LEGEND,
         examples=examples,
-        gaps=gaps(rows, examples),
-        widths=widths(rows),
+        gaps=gaps(pictured, examples),
+        widths=widths(pictured),
         stands_mps=EDGES_MPS[0],
         unpaced=rows_without(material.everything["iou"]["paces"], rows),
         failures=provenance.failures(runs),

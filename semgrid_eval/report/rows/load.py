@@ -105,6 +105,11 @@ class Row:
         return self.record.facts.disturbed
 
     @property
+    def is_stream(self) -> bool:
+        """Whether it is scored as its answers come; then its windows are blocks of time."""
+        return self.record.facts.stream is not None
+
+    @property
     def targets(self) -> str:
         """The comparability key of its results; empty where there is none."""
         return self.results[0].record.targets if self.results else ""
@@ -113,7 +118,8 @@ class Row:
     def question(self) -> tuple[object, ...]:
         """What it is asked: targets, sensors, number of inputs, their step, horizon, translation and disturbance."""
         f = self.record.facts
-        return self.targets, f.sensors, f.inputs, f.step_frames, f.horizon_steps, f.translate, f.disturbed
+        ahead = f.step_frames, f.horizon_steps, f.lead_ms
+        return self.targets, f.sensors, f.inputs, ahead, f.translate, f.disturbed
 
     @property
     def shown(self) -> Result:
@@ -182,7 +188,8 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
 def _besides_scores(run: Path, rows: Sequence[Row]) -> tuple[tuple[Fault, ...], tuple[str, ...]]:
     """Look at what a report's examples are made from: what is wrong with its files, and what a run found in logs."""
     results = [result for row in rows for result in row.results]
-    asked = {files.windows_file(run, result.record.windows_id): "windows" for result in results}
+    kept = [result.record.windows_id for result in results if result.record.stream is None]
+    asked = {files.windows_file(run, windows_id): "windows" for windows_id in kept}
     predictions = (result.folder / files.PREDICTIONS_FILE for result in results)
     asked |= {path: "predictions" for path in predictions if path.exists()}
     faults, said = [], list[str]()

@@ -107,8 +107,9 @@ def verdict(difference: Estimate) -> str:
     return "gain" if difference.low > 0 else "loss" if difference.high < 0 else "open"
 
 
-def _frames_ahead(row: Row) -> int:
-    return row.record.facts.horizon_steps * row.record.facts.step_frames
+def _frames_ahead(row: Row) -> tuple[int, float | None]:
+    facts = row.record.facts
+    return facts.horizon_steps * facts.step_frames, facts.lead_ms
 
 
 def _nearness(row: Row, other: Row) -> tuple[bool, ...]:

@@ -1,0 +1,53 @@
+"""The lead that is best at a latency: of rows that differ in their lead alone, by category."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores, interval_of
+from semgrid_eval.report.estimates.streams import facts_of
+from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, settings_but
+from semgrid_eval.scores.metrics.metric import column_names
+
+
+@dataclass(frozen=True)
+class LeadSeries:
+    """Streams that differ in their lead alone, from the shortest to the longest."""
+
+    entries: tuple[RowScores, ...]
+
+    @property
+    def leads_ms(self) -> list[float]:
+        """The leads."""
+        return [lead_of(entry) for entry in self.entries]
+
+    def best(self, column: str) -> tuple[RowScores, Estimate]:
+        """Return the row with the highest value, and its lead in ms; the interval is that of the best lead by draw."""
+        values = np.array([entry.mean[column] for entry in self.entries])
+        at = column_names(self.entries[0].metric).index(column)
+        draws = np.nan_to_num(np.stack([entry.draws[:, at] for entry in self.entries]), nan=-np.inf)  # (L, B)
+        chosen = self.entries[int(np.nanargmax(values))] if np.isfinite(values).any() else self.entries[0]
+        return chosen, interval_of(lead_of(chosen), np.array(self.leads_ms)[draws.argmax(axis=0)])
+
+
+def lead_of(entry: RowScores) -> float:
+    """Return the lead of a row in ms."""
+    lead_ms = entry.row.record.facts.lead_ms
+    assert lead_ms is not None
+    return lead_ms
+
+
+def lead_series(scores: Scores) -> list[LeadSeries]:
+    """Group streams by all but their lead, those whose latency was measured first; groups of one lead are left out."""
+    groups: dict[object, list[RowScores]] = {}
+    for entry in scores.values():
+        if entry.row.is_stream and entry.row.record.facts.lead_ms is not None:
+            groups.setdefault((entry.row.run, settings_but(entry.row, "lead_ms")), []).append(entry)
+    found = [LeadSeries(tuple(sorted(each, key=lead_of))) for each in groups.values() if len(each) > 1]
+    return sorted(found, key=lambda series: not facts_of(series.entries[0].row).measured)
+
+
+def best_leads(found: Sequence[LeadSeries]) -> dict[str, float]:
+    """Return the best lead in ms of the first series by category; nothing where there is no series."""
+    return {column: found[0].best(column)[1].value for column in DIFFERENCE_COLUMNS} if found else {}

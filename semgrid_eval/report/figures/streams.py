@@ -1,0 +1,79 @@
+"""Streaming IoU over the delay of answers, a curve for each strategy."""
+
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
+from semgrid_eval.report.estimates.streams import Strategy, facts_of, record_of
+from semgrid_eval.report.figures.style import SETTINGS, Plot, evidence, finish, line_style, short
+from semgrid_eval.report.rows.pairing import HEADLINE
+
+_CAPTION = (
+    "Streaming IoU by the delay of answers: median time from the beginning of the work on a frame to its answer; large "
+    "marks are at the latency that was measured. Bands are 95% intervals; broken lines are bounds. "
+)
+STREAM_COLUMNS = ("row", "strategy", "added_ms", "delay_ms", "age_ms", "lead_ms", "misses", "evaluations")
+
+
+def stream_frame(found: Sequence[Strategy]) -> pd.DataFrame:
+    """Return one line for each row with a stream: its strategy, its times and its categories."""
+    columns = [name for name in LABELS if name.endswith(("known", "static", "dynamic")) or name == "vehicles"]
+    lines = [
+        {
+            "row": entry.row.name,
+            "strategy": strategy.name,
+            "added_ms": facts_of(entry.row).added_ms,
+            "delay_ms": record_of(entry.row).latency_ms,
+            "age_ms": record_of(entry.row).age_ms,
+            "lead_ms": record_of(entry.row).lead_ms,
+            "misses": record_of(entry.row).misses,
+            "evaluations": record_of(entry.row).evaluations,
+            **{name: entry.mean[name] for name in columns},
+        }
+        for strategy in found
+        for entry in strategy.entries
+    ]
+    return pd.DataFrame(lines, columns=[*STREAM_COLUMNS, *columns])
+
+
+def stream_plots(found: Sequence[Strategy], moving: Scores) -> list[Plot]:
+    """Draw the mean of all cells and vehicles near moving actors over the delay; nothing where no delay varies."""
+    curves = [each for each in found if len(each.entries) > 1]
+    if not curves:
+        return []
+    panels = [("all cells", HEADLINE, {entry.row.name: entry for each in curves for entry in each.entries})]
+    if moving:
+        panels.append(("near moving actors", "vehicles", dict(moving)))
+    with mpl.rc_context(SETTINGS):
+        figure = Figure(figsize=(5.2 * len(panels), 3.8), layout="constrained")
+        places = figure.subplots(1, len(panels), squeeze=False)[0]
+        for axes, (where, column, scores) in zip(places, panels, strict=True):
+            for index, strategy in enumerate(curves):
+                _draw(axes, strategy, scores, column, index)
+            axes.set(xlabel="delay of answers, ms", ylabel="streaming IoU", title=f"{LABELS[column]}, {where}")
+        figure.axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        whole = {entry.row.name: entry for each in curves for entry in each.entries}
+        return [finish(figure, "streams", "streams.csv", f"{_CAPTION}{evidence(whole)}.")]
+
+
+def _draw(axes: Axes, strategy: Strategy, scores: Scores, column: str, index: int) -> None:
+    entries = [scores[entry.row.name] for entry in strategy.entries if entry.row.name in scores]
+    if not entries:
+        return
+    delays = [record_of(entry.row).latency_ms for entry in entries]
+    style = line_style(index) | {"linestyle": "--" if _is_bound(entries[0]) else "-"}
+    estimates = [entry.estimate(column) for entry in entries]
+    axes.plot(delays, [each.value for each in estimates], marker="o", markersize=3, label=short(strategy.name), **style)
+    if (measured := scores.get(strategy.measured.row.name)) is not None:
+        axes.plot([strategy.delay_ms], [measured.mean[column]], marker="o", markersize=8, **style)
+    axes.fill_between(
+        delays, [each.low for each in estimates], [each.high for each in estimates], color=style["color"], alpha=0.12
+    )
+
+
+def _is_bound(entry: RowScores) -> bool:
+    return entry.row.uses_truth or facts_of(entry.row).asked == "exact"

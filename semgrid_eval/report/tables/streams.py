@@ -1,0 +1,143 @@
+"""Tables of streams: every strategy at the latency that was measured, and what predictions win over the newest grid."""
+
+import math
+from collections.abc import Sequence
+
+from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores, Scores
+from semgrid_eval.report.estimates.leads import LeadSeries
+from semgrid_eval.report.estimates.streams import Strategy, facts_of, plain_strategy, record_of, won_ms
+from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, verdict
+from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, signed
+from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
+from semgrid_eval.report.tables.values import evidence
+
+_COLUMNS = (*DIFFERENCE_COLUMNS[:-1], HEADLINE)
+_MOVING = ("vehicles", "person")
+_STREAMS = (
+    "Streaming IoU: at each time of evaluation, the newest grid that was published by then against what is measured at "
+    "that time; with 95% interval. Latency: from the beginning of the work on a frame to its answer, median. Age: from "
+    "the capture of the newest input to the time of evaluation, median (99th percentile). Lead: how far after that "
+    "capture the grid is for. Misses: times of evaluation before the first answer, at which all is unknown."
+)
+_LEADS = (
+    "The lead, from the capture of the newest input to the time that a grid is for, of the highest streaming IoU, and "
+    "the interval of the lead that is best in a resample; the score stands in the tooltip. Read from leads.json by a "
+    "row's lead_ms: from REPORT/leads.json."
+)
+_WINS = (
+    "What each strategy wins over {plain} at its own latency: paired differences of streaming IoU, and for how many ms "
+    "it may work longer than {plain} and still have the same mean."
+)
+
+
+def stream_table(found: Sequence[Strategy], warm: Scores, moving: Scores) -> Table | None:
+    """Show every strategy at its least delay; None where there is no stream."""
+    if not found:
+        return None
+    columns = [(LABELS[column], "") for column in _COLUMNS]
+    columns += [("Mean", "after the warm-up"), *((LABELS[column], "near moving actors") for column in _MOVING)]
+    columns += [("Latency", "ms"), ("Age", "ms"), ("Lead", "ms"), ("Misses", "")]
+    return Table("streams", _STREAMS, "Strategy", tuple(columns), tuple((_line(each, warm, moving),) for each in found))
+
+
+def _line(strategy: Strategy, warm: Scores, moving: Scores) -> Line:
+    entry, record = strategy.measured, record_of(strategy.measured.row)
+    cells = [_value(entry, column) for column in _COLUMNS]
+    cells += [_found(warm, entry, HEADLINE), *(_found(moving, entry, column) for column in _MOVING)]
+    cells += [_ms(record.latency_ms), _ms(record.age_ms, f"{record.oldest_ms:.0f}"), _ms(record.lead_ms)]
+    share = record.misses / max(1, record.evaluations)
+    cells.append(Cell(f"{share:.1%}", share, f"of {record.evaluations:,}", f"{record.misses:,} without an answer"))
+    return Line(strategy.name, tuple(cells), "truth" if entry.row.uses_truth else "", entry.row.record.label)
+
+
+def _value(entry: RowScores, column: str) -> Cell:
+    return value_cell(entry.estimate(column), title=evidence(entry, column))
+
+
+def _found(scores: Scores, entry: RowScores, column: str) -> Cell:
+    other = scores.get(entry.row.name)
+    return Cell(ABSENT) if other is None else _value(other, column)
+
+
+def _ms(value: float, note: str = "") -> Cell:
+    return Cell(f"{value:.0f}", value, note)
+
+
+def wins_table(found: Sequence[Strategy]) -> Table | None:
+    """Show what strategies win over the newest grid as it is; None where there is nothing to measure by."""
+    plain = plain_strategy(found)
+    others = [each for each in found if plain and each is not plain and _same(each, plain)]
+    if plain is None or not others:
+        return None
+    columns = tuple([(LABELS[column], "") for column in _COLUMNS] + [("Time", "ms")])
+    bodies = tuple((_wins(each, plain),) for each in others)
+    return Table("stream-wins", _WINS.replace("{plain}", plain.name), "Strategies", columns, bodies)
+
+
+def _same(strategy: Strategy, other: Strategy) -> bool:
+    mine, theirs = strategy.measured, other.measured
+    return mine.row.run == theirs.row.run and mine.cells_key[0] == theirs.cells_key[0]
+
+
+def _wins(strategy: Strategy, plain: Strategy) -> Line:
+    entry = strategy.measured
+    cells = []
+    for column in _COLUMNS:
+        difference = entry.minus(plain.measured, column)
+        title = f"{evidence(entry, column)}; difference: {interval_phrase(difference, with_sign=True)}"
+        cells.append(difference_cell(difference, title=title))
+    cells.append(_won(won_ms(strategy, plain, HEADLINE)))
+    kind = "truth" if entry.row.uses_truth else ""
+    return Line(f"{strategy.name} {MINUS} {plain.name}", tuple(cells), kind, entry.row.record.label)
+
+
+def _won(won: Estimate) -> Cell:
+    if not math.isfinite(won.value):
+        return Cell(ABSENT, title="its score lies outside of those of the curve")
+    ends = [f"{end:+.0f}" for end in (won.low, won.high) if math.isfinite(end)]
+    return Cell(f"{won.value:+.0f}", finite(won.value), " to ".join(ends) if len(ends) == 2 else "", tone=verdict(won))
+
+
+def lead_table(found: Sequence[LeadSeries]) -> Table | None:
+    """Show the best lead of each series by category; None where there is none."""
+    columns = tuple((LABELS[column], "ms") for column in _COLUMNS)
+    lines = tuple((_best_leads(series),) for series in found)
+    return Table("stream-leads", _LEADS, "Streams", columns, lines) if lines else None
+
+
+def _best_leads(series: LeadSeries) -> Line:
+    cells = []
+    for column in _COLUMNS:
+        entry, lead = series.best(column)
+        note = f"{lead.low:.0f} to {lead.high:.0f}" if math.isfinite(lead.low) else ""
+        cells.append(Cell(f"{lead.value:.0f}", finite(lead.value), note, evidence(entry, column)))
+    first, last = series.entries[0], series.entries[-1]
+    return Line(f"{first.row.name} to {last.row.name}", tuple(cells), title=first.row.record.label)
+
+
+def stream_sentence(found: Sequence[Strategy]) -> str:
+    """Say what prediction is worth at the measured latency; empty where nothing can be compared."""
+    plain = plain_strategy(found)
+    predicted = [
+        each
+        for each in found
+        if plain and each is not plain and _same(each, plain) and not each.measured.row.uses_truth and _predicts(each)
+    ]
+    if plain is None or not predicted:
+        return ""
+    best = max(predicted, key=lambda each: each.measured.mean[HEADLINE])
+    gain, won = best.measured.minus(plain.measured, HEADLINE), won_ms(best, plain, HEADLINE)
+    words = {"gain": "better", "loss": "worse", "open": "not clearly different"}[verdict(gain)]
+    first = (
+        f"When answers come {best.delay_ms:.0f} ms late, {best.name} has a mean streaming IoU of "
+        f"{number(best.measured.mean[HEADLINE])} and {plain.name} {number(plain.measured.mean[HEADLINE])}: "
+        f"{signed(gain.value)}, {words} ({interval_phrase(gain, with_sign=True)})"
+    )
+    if not math.isfinite(won.value):
+        return f"{first}."
+    as_late = best.delay_ms - won.value
+    return f"{first}, as good as {plain.name} would be {as_late:.0f} ms late."
+
+
+def _predicts(strategy: Strategy) -> bool:
+    return facts_of(strategy.measured.row).asked in ("fixed", "adaptive", "known")

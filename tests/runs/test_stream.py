@@ -1,0 +1,136 @@
+"""Rows with a stream in a run: kept, told apart from plain rows, reported; and what they refuse."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from support.small_runs import run, write_logs
+
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.report.page.write import write_report
+from semgrid_eval.runs.matrix import load_matrix
+from semgrid_eval.scores import results
+
+STILL = {"name": "still", "model": "newest", "stream": {"latency_ms": 100, "move": False}}
+ROWS = [
+    {"name": "BL-DC", "model": "newest"},
+    STILL,
+    *(
+        {"name": f"{name}+{added}", "model": model, "stream": {"latency_ms": 60, "asked": asked, "added_ms": added}}
+        for added in (0.0, 120.0)
+        for name, model, asked in (("newest", "newest", "capture"), ("fuse", "fuse", "known"))
+    ),
+    {"name": "table", "model": "table", "stream": {"latency_ms": 60, "asked": "fixed"}},
+    *(
+        {
+            "name": f"flow for {lead}",
+            "model": "flow",
+            "window": {"lead_ms": lead, "target_frame": None},
+            "stream": {"latency_ms": 60, "asked": "fixed"},
+        }
+        for lead in (59.0, 177.0)
+    ),
+]
+
+
+@pytest.fixture(scope="module", name="logs")
+def logs_fixture(tmp_path_factory):
+    return write_logs(tmp_path_factory.mktemp("logs"))
+
+
+@pytest.fixture(scope="module", name="done")
+def done_fixture(logs, tmp_path_factory):
+    out = tmp_path_factory.mktemp("runs") / "run"
+    record = run(ROWS, logs, out)
+    assert {row.name: row.failure for row in record.rows} == dict.fromkeys(row["name"] for row in ROWS)
+    return out, {row.name: results.read_result(results.result_folder(out, row.results[0])) for row in record.rows}
+
+
+def test_streams_share_their_targets_with_each_other_and_not_with_plain_rows(done):
+    _, found = done
+    streams = {name: result for name, result in found.items() if name != "BL-DC"}
+    assert len({result.targets for result in streams.values()}) == 1
+    assert found["BL-DC"].targets != streams["still"].targets
+    assert found["BL-DC"].stream is None
+    assert len({result.id for result in found.values()}) == len(ROWS)
+
+
+def test_a_stream_says_how_it_went(done):
+    _, found = done
+    late = found["newest+120.0"].stream
+    assert late.latency_ms == 180
+    assert late.age_ms >= 180
+    assert 0 < late.misses < late.evaluations
+    assert found["fuse+0.0"].stream.lead_ms > found["newest+0.0"].stream.lead_ms == 0
+    # A fixed lead in ms is the nearest number of frames.
+    assert found["flow for 177.0"].stream.lead_ms == pytest.approx(3 * found["flow for 59.0"].stream.lead_ms, rel=1e-3)
+
+
+def test_what_is_later_is_worse_and_moving_along_is_better(done):
+    out, found = done
+
+    def right(name):
+        counts = results.read_sums(results.result_folder(out, found[name].id), "iou", "all").sum(axis=(0, 1))
+        return np.trace(counts) / counts.sum()
+
+    assert right("newest+0.0") > right("newest+120.0")
+    assert right("newest+0.0") >= right("still")
+
+
+def test_a_second_run_finds_everything(done, logs):
+    out, found = done
+    again = run(ROWS, logs, out)
+    assert {row.results[0] for row in again.rows} == {result.id for result in found.values()}
+
+
+def test_the_page_shows_strategies_and_the_best_lead_can_be_taken(done, tmp_path):
+    out, _ = done
+    page = write_report(out, tmp_path / "report").read_text()
+    assert page.count('id="table-streams"') == page.count('id="table-stream-wins"') == 1
+    with (tmp_path / "report" / "streams.csv").open() as stream:
+        lines = list(csv.DictReader(stream))
+    assert {line["strategy"] for line in lines} >= {"still", "newest", "fuse", "table"}
+    assert [line["added_ms"] for line in lines if line["strategy"] == "newest"] == ["0.000000", "120.000000"]
+    shown = json.loads((tmp_path / "report" / "tables" / "categories.json").read_text())
+    assert "newest+0.0" in str(shown)
+    assert "newest+120.0" not in str(shown), "rows that are only later have their own section"
+    leads = json.loads((tmp_path / "report" / "leads.json").read_text())["lead_ms"]
+    assert leads["mean_known"] in (59.0, 177.0)
+    taken = tmp_path / "taken.yaml"
+    row = {"name": "taken", "model": "flow", "window": {"lead_ms": f"from {tmp_path}/report/leads.json"}}
+    taken.write_text(json.dumps({"rows": [row]}))
+    assert load_matrix(str(taken)).rows[0].window.lead_ms == leads["mean_known"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"stream": {}}, "give one of latency_ms and profile"),
+        ({"stream": {"latency_ms": 1, "profile": "p.json"}}, "give one of latency_ms and profile"),
+        ({"stream": {"latency_ms": -1}}, "latency_ms"),
+        ({"stream": {"latency_ms": 1, "scale": 2}}, "scale and profile_model belong to a profile"),
+        ({"stream": {"latency_ms": 1, "workers": "many", "rule": "shrinking_tail"}}, "one worker waits"),
+        ({"stream": {"latency_ms": 1}, "disturb": {"kind": "lost_frame"}}, "neither disturbed inputs"),
+        ({"stream": {"latency_ms": 1}, "second_target": "expected"}, "neither disturbed inputs nor a second target"),
+        ({"model": "ceiling", "stream": {"latency_ms": 1}}, "answers for each time of evaluation: exact"),
+        ({"model": "ed", "stream": {"latency_ms": 1, "asked": "known"}}, "needs a model that answers any lead"),
+        ({"window": {"lead_ms": 100, "horizon_steps": 2}}, "give one of lead_ms and horizon_steps"),
+        ({"window": {"lead_ms": "from nowhere.json"}}, "nowhere.json"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(changes, fault, tmp_path):
+    path = tmp_path / "matrix.yaml"
+    path.write_text(json.dumps({"rows": [{"name": "one", "model": "newest", **changes}]}))
+    with pytest.raises(ConfigError, match=fault):
+        load_matrix(str(path))
+
+
+def test_a_profile_that_is_not_there_is_the_failure_of_its_row_alone(logs, tmp_path):
+    rows = [
+        {"name": "BL-DC", "model": "newest"},
+        {"name": "late", "model": "newest", "stream": {"profile": "gone.json"}},
+    ]
+    record = run(rows, logs, tmp_path / "run")
+    assert [row.failure is None for row in record.rows] == [True, False]
+    assert "gone.json" in record.rows[1].failure
