@@ -129,14 +129,15 @@ def stream_sentence(found: Sequence[Strategy]) -> str:
     gain, won = best.measured.minus(plain.measured, HEADLINE), won_ms(best, plain, HEADLINE)
     words = {"gain": "better", "loss": "worse", "open": "not clearly different"}[verdict(gain)]
     first = (
-        f"When answers come {best.delay_ms:.0f} ms late, {best.name} has a mean streaming IoU of "
-        f"{number(best.measured.mean[HEADLINE])} and {plain.name} {number(plain.measured.mean[HEADLINE])}: "
-        f"{signed(gain.value)}, {words} ({interval_phrase(gain, with_sign=True)})"
+        f"{best.name}, whose answers come {best.delay_ms:.0f} ms late, has a mean streaming IoU of "
+        f"{number(best.measured.mean[HEADLINE])}; {plain.name}, {plain.delay_ms:.0f} ms late, "
+        f"{number(plain.measured.mean[HEADLINE])}: {signed(gain.value)}, {words} "
+        f"({interval_phrase(gain, with_sign=True)})"
     )
     if not math.isfinite(won.value):
         return f"{first}."
     as_late = best.delay_ms - won.value
-    return f"{first}, as good as {plain.name} would be {as_late:.0f} ms late."
+    return f"{first}. {plain.name} would be as good {as_late:.0f} ms late."
 
 
 def _predicts(strategy: Strategy) -> bool:

@@ -1,0 +1,141 @@
+"""Streams in a report: curves, what a prediction wins in time, the best lead and the warm-up, each by hand."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.fake_run import counted_row
+from support.scoring import score_rows
+
+from semgrid_eval.report.estimates.leads import best_leads, lead_series
+from semgrid_eval.report.estimates.streams import plain_strategy, strategies, warm_up, won_ms
+from semgrid_eval.report.figures.streams import stream_frame, stream_plots
+from semgrid_eval.report.tables.streams import stream_sentence, stream_table, wins_table
+from semgrid_eval.scores.facts import StreamFacts, StreamRecord
+from semgrid_eval.scores.metrics.table import IOU
+
+
+def stream(name, hits, *, delay, asked="capture", measured=False, moved=True, first=0.0, lead_ms=None, **config):
+    """A row with a stream that has as many hits of road and car in each of its recordings."""
+    values = hits if isinstance(hits, list) else [hits] * 12
+    made = counted_row(name, {"road": values, "car": values})
+    how = StreamFacts(words="moved along" if moved else "not moved", added_ms=delay, measured=measured, asked=asked)
+    bound = "lower" if asked == "capture" else ""
+    facts = made.record.facts.model_copy(update={"stream": how, "bound": bound, "lead_ms": lead_ms})
+    went = StreamRecord(
+        evaluations=40,
+        misses=1,
+        answers=20,
+        first_answer_ms=first,
+        age_ms=delay,
+        oldest_ms=delay,
+        latency_ms=delay,
+        lead_ms=lead_ms or 0.0,
+    )
+    settings = {"asked": asked, "move": moved, "stream": {"added_ms": delay}, "window": {"lead_ms": lead_ms}, **config}
+    record = made.results[0].record.model_copy(update={"facts": facts, "stream": went, "config": settings})
+    result = replace(made.results[0], record=record)
+    return replace(made, record=made.record.model_copy(update={"facts": facts}), results=(result,))
+
+
+def rows():
+    plain = [
+        stream(f"BL-newest +{at}", hits, delay=float(at)) for at, hits in ((0, 100), (100, 80), (200, 60), (400, 40))
+    ]
+    return [
+        *plain,
+        stream("BL-newest", 60, delay=200.0, measured=True),
+        stream("BL-still", 50, delay=200.0, measured=True, moved=False),
+        stream("RN", 70, delay=220.0, measured=True, asked="adaptive"),
+    ]
+
+
+def scored(found):
+    return score_rows(found, np.random.default_rng(0))
+
+
+def test_rows_that_differ_in_their_latency_alone_are_one_strategy_with_the_measured_one_for_it():
+    found = {each.name: each for each in strategies(scored(rows()))}
+    assert list(found) == ["BL-newest", "BL-still", "RN"]
+    assert found["BL-newest"].measured.row.name == "BL-newest"
+    assert found["BL-newest"].delays_ms == [0, 100, 200, 200, 400]
+    assert plain_strategy(list(found.values())) is found["BL-newest"], "moved along rather than not"
+
+
+def test_what_is_won_in_time_is_read_from_the_curve_of_the_newest_grid():
+    found = {each.name: each for each in strategies(scored(rows()))}
+    plain, network = found["BL-newest"], found["RN"]
+    assert plain.delay_with(0.9, "mean_known") == pytest.approx(50)
+    assert plain.delay_with(0.4, "mean_known") == pytest.approx(400)
+    assert math.isnan(plain.delay_with(0.3, "mean_known"))
+    # .70 is what the newest grid has after 150 ms, and the network answers after 220.
+    won = won_ms(network, plain, "mean_known")
+    assert (won.value, won.low, won.high) == (pytest.approx(70), pytest.approx(70), pytest.approx(70))
+    sentence = stream_sentence(list(found.values()))
+    assert sentence.startswith(
+        "RN, whose answers come 220 ms late, has a mean streaming IoU of 0.700; BL-newest, 200 ms"
+    )
+    assert sentence.endswith("BL-newest would be as good 150 ms late.")
+
+
+def test_tables_and_figure_show_each_strategy_once_and_each_row_is_in_the_frame():
+    found = strategies(scored(rows()))
+    table = stream_table(found, {}, {})
+    assert [body[0].header for body in table.bodies] == ["BL-newest", "BL-still", "RN"]
+    assert [body[0].header for body in wins_table(found).bodies] == ["BL-still − BL-newest", "RN − BL-newest"]
+    frame = stream_frame(found)
+    assert len(frame) == len(rows())
+    assert frame[frame.strategy == "BL-newest"].delay_ms.tolist() == [0, 100, 200, 200, 400]
+    assert len(stream_plots(found, {})) == 1
+    assert stream_plots(strategies(scored(rows()[-1:])), {}) == []
+
+
+def test_without_a_stream_there_is_nothing_to_show():
+    found = strategies(scored([counted_row("BL-DC", {"road": [1] * 12})]))
+    assert (found, stream_table(found, {}, {}), wins_table(found), stream_sentence(found)) == ([], None, None, "")
+
+
+def test_the_best_lead_is_by_category_and_its_interval_is_that_of_the_best_by_draw():
+    """One lead is better in half of the recordings by as much as it is worse in the others: either may win a draw."""
+    even = [60] * 6 + [40] * 6
+    leads = [
+        stream("RN for 100", even, delay=200.0, asked="fixed", measured=True, lead_ms=100.0),
+        stream(
+            "RN for 200", [each + 1 for each in even[::-1]], delay=200.0, asked="fixed", measured=True, lead_ms=200.0
+        ),
+        stream("RN for 300", 10, delay=200.0, asked="fixed", measured=True, lead_ms=300.0),
+    ]
+    (series,) = lead_series(scored(leads[::-1]))
+    entry, lead = series.best("mean_known")
+    assert entry.row.name == "RN for 200"
+    assert (lead.value, lead.low, lead.high) == (200.0, 100.0, 200.0)
+    assert best_leads([series])["mean_known"] == 200.0
+    assert lead_series(scored(leads[:1])) == []
+
+
+def test_the_warm_up_ends_with_the_first_answer_of_the_slowest_strategy():
+    def blocks(row):
+        """Let its windows be blocks of half a second of two recordings."""
+        windows = tuple(
+            window.model_copy(
+                update={
+                    "recording": f"town_{i // 6}",
+                    "input_stamps_ns": (i % 6 * 500_000_000 + i // 6,),
+                    "target_stamp_ns": (i % 6 + 1) * 500_000_000 + i // 6,
+                }
+            )
+            for i, window in enumerate(row.results[0].record.windows)
+        )
+        result = replace(row.results[0], record=row.results[0].record.model_copy(update={"windows": windows}))
+        return replace(row, results=(result,))
+
+    class Run:
+        rows = (blocks(stream("a", 50, delay=1.0, first=100.0)), blocks(stream("b", 50, delay=2.0, first=700.0)))
+
+    division = warm_up([Run])
+    for row in Run.rows:
+        sums = division.sums(row, row.results[0], IOU)[:, 0].sum(axis=(1, 2))
+        assert (sums > 0).tolist() == [False, False, True, True, True, True] * 2
+    plain = counted_row("BL-DC", {"road": [1] * 12})
+    assert division.sums(plain, plain.results[0], IOU) is None
