@@ -1,9 +1,9 @@
 """How long the stages of a chain take, frame by frame: measured once, kept as JSON, and drawn from."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,3 +114,17 @@ def read_profile(path: Path) -> LatencyProfile:
 def write_profile(path: Path, profile: LatencyProfile) -> None:
     """Write a profile atomically."""
     write_json(path, profile.model_dump(mode="json"))
+
+
+class Spread(NamedTuple):
+    """How samples are spread, in milliseconds."""
+
+    median_ms: float
+    p99_ms: float  # 99th percentile, between samples by interpolation
+    max_ms: float
+
+
+def spread(samples_ms: Sequence[float] | NDArray[np.float64]) -> Spread:
+    """Describe samples (N,)."""
+    median_ms, p99_ms, max_ms = np.percentile(samples_ms, (50, 99, 100))
+    return Spread(float(median_ms), float(p99_ms), float(max_ms))
