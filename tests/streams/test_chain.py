@@ -98,7 +98,7 @@ def test_labels_of_a_network_take_the_place_of_those_of_the_log(log, tmp_path):
 
 
 def with_right_images(log, folder, *, frames=FRAMES):
-    """Write a log with left images, and right ones into the folder: textures that lie where the log's disparity says."""
+    """Write a log with left images, and right ones into the folder: textures where the log says that they lie."""
     recording = street(1, frames=FRAMES).recording("toy")
     noise = np.random.default_rng(0).standard_normal((128, 256)).astype(np.float32)
     right = np.clip(128 + 200 * cv2.GaussianBlur(noise, (0, 0), 1.2), 0, 255).astype(np.uint8)
