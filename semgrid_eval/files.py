@@ -139,13 +139,13 @@ def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 - anything that 
     write_text(path, json.dumps(value, indent=2, sort_keys=True, allow_nan=False) + "\n")
 
 
-def read_json(path: Path) -> Any:  # noqa: ANN401 - anything that JSON can hold
+def read_json(path: Path, *, limit: int = JSON_LIMIT_BYTES) -> Any:  # noqa: ANN401 - anything that JSON can hold
     """Read a JSON file.
 
     Raises:
-        InputError: the file is missing, unreadable or not JSON.
+        InputError: the file is missing, unreadable, not JSON, or has more bytes than `limit`.
     """
-    content = read_bytes(path, limit=JSON_LIMIT_BYTES)
+    content = read_bytes(path, limit=limit)
     try:
         return json.loads(content)
     except (ValueError, RecursionError) as error:

@@ -15,7 +15,7 @@ import click
 from semgrid_eval import __version__
 from semgrid_eval.errors import SemgridError, printable
 
-_COMMANDS = ("convert", "check", "segment", "grids", "run", "report", "play", "demo", "bench")
+_COMMANDS = ("convert", "check", "segment", "grids", "run", "report", "play", "demo", "bench", "latency")
 """Modules of `semgrid_eval.cli`."""
 _GO_ON = ("convert", "segment", "grids", "run", "demo")
 """Commands that keep what is done, so that after a stop they need not begin again."""

@@ -80,17 +80,17 @@ class _Tensor(NamedTuple):
 
 
 class SegmentationNetwork:
-    """Labels colour images.
+    """Labels colour images, on so many threads; by default on those that OMP_NUM_THREADS names, else on all cores.
 
     Raises:
         MissingExtraError: ONNX Runtime is not installed.
         InputError: the file is not an ONNX model, or does not turn one image into classes as the config says.
     """
 
-    def __init__(self, path: Path, config: SegmentationConfig) -> None:
+    def __init__(self, path: Path, config: SegmentationConfig, *, threads: int | None = None) -> None:
         self._path, self._config = path, config
         self._classes, self._label_ids = _classes(label_ids=config.label_ids)
-        self._session = _open(path)
+        self._session = _open(path, threads or _threads())
         self._input = self._only_input()
         self._open_width, self._open_height = self._sides()
         self._output = self._chosen_output()
@@ -204,7 +204,7 @@ def _classes(*, label_ids: bool) -> tuple[int, NDArray[np.uint8]]:
     return len(CITYSCAPES_LABELS), table
 
 
-def _open(path: Path) -> Any:  # noqa: ANN401 - ONNX Runtime has no types
+def _open(path: Path, threads: int) -> Any:  # noqa: ANN401 - ONNX Runtime has no types
     try:
         import onnxruntime
     except ImportError:
@@ -213,7 +213,7 @@ def _open(path: Path) -> Any:  # noqa: ANN401 - ONNX Runtime has no types
         raise InputError("is not a file", path=path, field="model")
     settings = onnxruntime.SessionOptions()
     settings.log_severity_level = 4  # what is wrong also comes as an exception
-    settings.intra_op_num_threads = _threads()
+    settings.intra_op_num_threads = threads
     try:
         return onnxruntime.InferenceSession(path, settings, providers=["CPUExecutionProvider"])
     except Exception as error:  # ONNX Runtime's errors have no base of their own

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import Floats
+from semgrid_eval.sources.town.simulation import STEP_S
 from semgrid_eval.sources.town.traffic import CAR_TYPES, Traffic
 
 FRONT_TO_REAR_AXLE_M = 3.8
@@ -21,10 +22,11 @@ STANDING_BELOW_MPS = 2.0
 CRUISE_MPS = (7.0, 2.6)  # mean and standard deviation of the drawn speeds of the rest
 CRUISE_LIMITS_MPS = (2.0, 13.0)
 _LEAD_STEPS = 40  # before a window, for the rear axle to find its track
-_WINDOW_STEPS = 33
+_SPARE_STEPS = 3  # of a window, for stamps that are off and steps that are not the frames' own
 _TAIL_STEPS = 14  # after a window, for smoothing
 _STRIDE_STEPS = 5
-_APART_STEPS = 60  # between two windows of one car
+_APART_STEPS = 27  # between two windows of one car
+_CHECKED_FRAMES = 10  # between two looks at who is inside the ego vehicle
 _CANDIDATES = 48
 _EGO_BOX_M = (-1.0, 4.3, 0.9)  # from, to, half width: nobody may be inside
 
@@ -113,26 +115,43 @@ def _smoothed(points: Floats, sigma: float) -> Floats:
 
 @dataclass(frozen=True)
 class Drive:
-    """A window of 30 frames of one simulated car."""
+    """A window of one simulated car."""
 
     actor: int
     start_s: float
+    frames: int = FRAME_COUNT
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first frame to the one after the last."""
+        return self.frames / FRAME_RATE_HZ
 
 
 def ego_path(traffic: Traffic, chosen: Drive) -> Trajectory | None:
     """Return the rear axle's path around a window, or None where the track is not one that a car drives."""
     first = traffic.step_before(chosen.start_s) - _LEAD_STEPS
-    end = first + _LEAD_STEPS + _WINDOW_STEPS + _TAIL_STEPS
+    end = first + _LEAD_STEPS + _window_steps(chosen.frames) + _TAIL_STEPS
     front_m, heading_rad = traffic.track(chosen.actor, first, end)
     return drive(np.asarray(traffic.times_s[first:end]), front_m, heading_rad)
 
 
-def choose_drives(traffic: Traffic, count: int, rng: np.random.Generator) -> list[Drive]:
+def _window_steps(frames: int) -> int:
+    """Return how many steps of the simulation hold so many frames."""
+    return math.ceil(frames / (FRAME_RATE_HZ * STEP_S)) + _SPARE_STEPS
+
+
+def needed_s(frames: int) -> float:
+    """Return how long a car must be there for a window of so many frames."""
+    return (_LEAD_STEPS + _window_steps(frames) + _TAIL_STEPS) * STEP_S
+
+
+def choose_drives(traffic: Traffic, count: int, rng: np.random.Generator, frames: int = FRAME_COUNT) -> list[Drive]:
     """Choose windows: a third standing or crawling, the rest by speeds drawn around 7 m/s; no two overlap in one car.
 
-    Traffic that does not hold so many is an InputError.
+    Speeds are means over a window. Traffic that does not hold so many windows is an InputError.
     """
-    actors, steps, speeds = _candidates(traffic)
+    apart = _window_steps(frames) + _APART_STEPS
+    actors, steps, speeds = _candidates(traffic, _window_steps(frames))
     free = np.ones(len(actors), bool)
     chosen: list[Drive] = []
     for target_mps in _target_speeds(count, rng):
@@ -140,30 +159,32 @@ def choose_drives(traffic: Traffic, count: int, rng: np.random.Generator) -> lis
             index = _closest(speeds, free, target_mps, rng)
             if index is None:
                 raise InputError(
-                    f"the town's traffic holds only {len(chosen)} of {count} windows; "
+                    f"the town's traffic holds only {len(chosen)} of {count} windows of {frames} frames; "
                     "ask for fewer recordings, more towns, a larger town or a longer time"
                 )
             free[index] = False
-            window = Drive(int(actors[index]), float(traffic.times_s[steps[index]]))
+            window = Drive(int(actors[index]), float(traffic.times_s[steps[index]]), frames)
             if _is_drivable(traffic, window):
                 break
-        free &= (actors != actors[index]) | (np.abs(steps - steps[index]) > _APART_STEPS)
+        free &= (actors != actors[index]) | (np.abs(steps - steps[index]) > apart)
         chosen.append(window)
     return chosen
 
 
-def _candidates(traffic: Traffic) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.float64]]:
+def _candidates(
+    traffic: Traffic, window_steps: int
+) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.float64]]:
     """Return actor, first step and mean speed of every window of every car, one in five steps."""
     rows = np.flatnonzero(np.isin(traffic.actor_types, CAR_TYPES)[traffic.actor])
     step_of_row = np.repeat(np.arange(len(traffic.times_s)), np.diff(traffic.offsets))
     order = rows[np.lexsort((step_of_row[rows], traffic.actor[rows]))]
     actor, step = np.asarray(traffic.actor[order]), step_of_row[order]
     covered_m = np.append(0.0, np.cumsum(traffic.speed_mps[order], dtype=np.float64))
-    first = np.arange(_LEAD_STEPS, len(order) - _WINDOW_STEPS - _TAIL_STEPS, _STRIDE_STEPS)
-    begin, end = first - _LEAD_STEPS, first + _WINDOW_STEPS + _TAIL_STEPS
+    first = np.arange(_LEAD_STEPS, len(order) - window_steps - _TAIL_STEPS, _STRIDE_STEPS)
+    begin, end = first - _LEAD_STEPS, first + window_steps + _TAIL_STEPS
     whole = (actor[begin] == actor[end]) & (step[end] - step[begin] == end - begin)
     first = first[whole]
-    speed = (covered_m[first + _WINDOW_STEPS] - covered_m[first]) / _WINDOW_STEPS
+    speed = (covered_m[first + window_steps] - covered_m[first]) / window_steps
     return actor[first], step[first], speed
 
 
@@ -190,7 +211,9 @@ def _is_drivable(traffic: Traffic, window: Drive) -> bool:
     path = ego_path(traffic, window)
     if path is None or np.abs(path.yaw_rate_radps).max() > MAX_YAW_RATE_RADPS:
         return False
-    for time_s in np.linspace(window.start_s, window.start_s + FRAME_COUNT / FRAME_RATE_HZ, 4):
+    for time_s in np.linspace(
+        window.start_s, window.start_s + window.duration_s, 1 + math.ceil(window.frames / _CHECKED_FRAMES)
+    ):
         x_m, y_m, yaw_rad, _, _ = path.at(float(time_s))
         others = traffic.at(float(time_s))
         away = others.centre_m[others.actor != window.actor] - (x_m, y_m)

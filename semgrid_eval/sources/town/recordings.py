@@ -1,6 +1,7 @@
 """Plans the recordings of a synthetic data set: which towns, which windows, which split."""
 
 import importlib.util
+import math
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from semgrid_eval.config import Config
 from semgrid_eval.errors import MissingExtraError
 from semgrid_eval.progress import Progress
 from semgrid_eval.sources.benchmarks import Stereo
-from semgrid_eval.sources.town.drives import choose_drives
+from semgrid_eval.sources.town.drives import FRAME_COUNT, choose_drives, needed_s
 from semgrid_eval.sources.town.kinds import KINDS
 from semgrid_eval.sources.town.rendering import CONDITIONS, RecordingPlan
 from semgrid_eval.sources.town.town import TownSpec, load_town, prepare_town
@@ -29,6 +30,7 @@ _ERRORS = (
 )
 _VAL_TOWNS = "Towns for validation, if it is another share than of the recordings."
 _TOWN_SIZE = "Side of the square that streets cover."
+_FRAMES = "Of a recording, at 17 a second; 340 are 20 s."
 _DURATION = "Simulated time of a town from which recordings are taken."
 _POSITIONS_PER_KM2_S = 25_000
 _MAX_POSITIONS = 10_000_000  # of everybody in a town at every step; they are held in memory, some 200 bytes each
@@ -37,7 +39,8 @@ _MAX_POSITIONS = 10_000_000  # of everybody in a town at every step; they are he
 class SyntheticConfig(Config):
     """What a synthetic data set is made of."""
 
-    recordings: Annotated[int, Field(ge=1, le=100_000, description="How many, of 30 frames each.")]
+    recordings: Annotated[int, Field(ge=1, le=100_000, description="How many.")]
+    frames: Annotated[int, Field(ge=2, le=20_000, description=_FRAMES)] = FRAME_COUNT
     seed: Annotated[int, Field(ge=0, lt=1 << 31, description="The same seed gives the same bytes.")] = 0
     towns: Annotated[int, Field(ge=1, le=100, description="How many; each belongs to one split only.")] = 4
     val_share: Annotated[
@@ -57,6 +60,13 @@ class SyntheticConfig(Config):
             raise ValueError("training and validation need different towns: ask for 2 towns or more, or val_share 0")
         if self.val_towns is not None and not (self.val_share > 0.0 and self.val_towns < self.towns):
             raise ValueError("val_towns must leave a town for training, and val_share recordings for validation")
+        return self
+
+    @model_validator(mode="after")
+    def _drives_fit_in_time(self) -> Self:
+        if (longest_s := needed_s(self.frames)) > self.duration_s:
+            least = f"a drive of {self.frames} frames needs a town of {math.ceil(longest_s)} s or more"
+            raise ValueError(f"{least}, not {self.duration_s:g} s: ask for a longer duration_s or fewer frames")
         return self
 
     @model_validator(mode="after")
@@ -129,7 +139,7 @@ def _prepare_towns(specs: list[TownSpec], cache_dir: Path, progress: Progress, w
 def _plans_of_town(config: SyntheticConfig, share: _Share, folder: Path, first: int) -> list[RecordingPlan]:
     spec = share.town
     traffic = load_town(folder).traffic
-    drives = choose_drives(traffic, share.recordings, np.random.default_rng([spec.seed, spec.index, 1]))
+    drives = choose_drives(traffic, share.recordings, np.random.default_rng([spec.seed, spec.index, 1]), config.frames)
     plans = [
         RecordingPlan(
             name=f"town{spec.index:02d}_{first + position:06d}_000000",

@@ -1,6 +1,7 @@
 """Renders one recording frame by frame: who is on stage, what the cameras see, what the vehicle reports, the truth."""
 
 import json
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -25,6 +26,7 @@ from semgrid_eval.sources.town.traffic import ROAD_USERS, Snapshot
 from semgrid_eval.sources.town.varied import Conditions, fixed_conditions
 
 _SIGHT_M = 160.0
+_APART_M = 40.0  # between two places around which the town is shown
 _BEHIND_M, _ASIDE_M = 9.0, 9.0  # includes what throws shadows into the picture, likewise what follows
 _WIDENING, _WIDENING_BEYOND = 0.55, 0.065  # aside for each metre ahead: at least, and beyond what a camera sees
 CAMERA_NAME = "front"
@@ -36,9 +38,9 @@ CONDITIONS = 4
 
 
 class Stage:
-    """A town around the place where a recording begins; what stands still is prepared once.
+    """A town around the places where a recording passes; what stands still is prepared once.
 
-    Its frame is the map frame with the origin moved to that place.
+    Its frame is the map frame with the origin moved to the first place.
     """
 
     def __init__(
@@ -46,19 +48,19 @@ class Stage:
         town: Town,
         cameras: Sequence[Camera],
         sunlight: Sunlight,
-        place_m: tuple[float, float],
+        places_m: Sequence[tuple[float, float]],
         widening: float = _WIDENING,
     ) -> None:
-        """Prepare a place; road users are shown up to `widening` metres aside for each metre ahead."""
-        self._place_m, self._widening = place_m, widening
+        """Prepare places; road users are shown up to `widening` metres aside for each metre ahead."""
+        self._place_m, self._widening = places_m[0], widening
         self._ground = town.scene.ground
         self._traffic = town.traffic
         corners = town.scene.soup.triangles_m[:, 0, :2]
-        near = np.linalg.norm(corners - np.array(place_m, np.float32), axis=1) < _SIGHT_M
-        self._still = town.scene.soup.where(near).moved(-place_m[0], -place_m[1])
+        near = [np.linalg.norm(corners - np.array(place, np.float32), axis=1) < _SIGHT_M for place in places_m]
+        self._still = town.scene.soup.where(np.any(near, axis=0)).moved(-self._place_m[0], -self._place_m[1])
         self._still_caster = RayCaster(self._still.triangles_m)
         self._painters = [(camera, Painter(camera, sunlight, self._still)) for camera in cameras]
-        self.parked = town.scene.parked.where(_is_near(town.scene.parked, *place_m))
+        self.parked = town.scene.parked.where(np.any([_is_near(town.scene.parked, *at) for at in places_m], axis=0))
 
     def others(self, time_s: float, pose: Pose, ego: int) -> Snapshot:
         """Return the road users near the ego vehicle, itself left out."""
@@ -122,6 +124,8 @@ class RecordingPlan:
         del values["town"]
         if self.drawn is None:  # so that logs that do not vary stay what they are
             del values["drawn"]
+        if self.drive.frames == drives.FRAME_COUNT:  # likewise
+            del values["drive"]["frames"]
         return {**values, "seed": list(self.seed)}
 
 
@@ -147,13 +151,13 @@ def _moments(plan: RecordingPlan) -> Iterator[Moment]:
     path = drives.ego_path(town.traffic, plan.drive)
     assert path is not None, "a plan's drive was checked when it was chosen"
     stamps, reports, light, errors = recording_streams(plan.seed)
-    times_s = plan.drive.start_s + np.arange(drives.FRAME_COUNT) / drives.FRAME_RATE_HZ
-    times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, drives.FRAME_COUNT - 1))
+    times_s = plan.drive.start_s + np.arange(plan.drive.frames) / drives.FRAME_RATE_HZ
+    times_s += np.append(0.0, stamps.normal(0.0, STAMP_JITTER_S, plan.drive.frames - 1))
     motion_noise = drives.EXACT_MOTION if plan.stereo == "exact" else plan.conditions.motion
     reported = drives.report(path, times_s, motion_noise, reports)
     rig = Rig(plan.conditions, plan.stereo, errors)
     widening = max(_WIDENING, plan.conditions.side_slope + _WIDENING_BEYOND)
-    stage = Stage(town, rig.cameras, draw_sunlight(light), path.at(float(times_s[0]))[:2], widening)
+    stage = Stage(town, rig.cameras, draw_sunlight(light), _places(path, times_s), widening)
     for time_s, told in zip(times_s, _rounded(reported), strict=True):
         stamp_ns = round(float(time_s) * 1e9)
         pose = Pose(stamp_ns, *_rounded(np.array(path.at(float(time_s))[:3])))
@@ -161,6 +165,16 @@ def _moments(plan: RecordingPlan) -> Iterator[Moment]:
         frame = rig.frame(stamp_ns, stage.pictures(others, float(time_s), pose))
         sample = MotionSample(stamp_ns, *told)
         yield Moment(stamp_ns, {CAMERA_NAME: frame}, (sample,), pose, (*_actors(others), *_actors(stage.parked)))
+
+
+def _places(path: drives.Trajectory, times_s: NDArray[np.float64]) -> list[tuple[float, float]]:
+    """Return where the vehicle is first, and whenever it has gone farther than a drive of 30 frames goes."""
+    places = [path.at(float(times_s[0]))[:2]]
+    for time_s in times_s[1:]:
+        here = path.at(float(time_s))[:2]
+        if math.dist(here, places[-1]) > _APART_M:
+            places.append(here)
+    return places
 
 
 def _rounded(values: NDArray[np.float64]) -> Any:  # noqa: ANN401 - floats, in lists as deep as the array

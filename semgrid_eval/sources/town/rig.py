@@ -1,6 +1,5 @@
 """The camera of a recording: what it sees becomes the files of a frame, with the errors that were asked for."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -11,14 +10,11 @@ from numpy.typing import NDArray
 from semgrid_eval.recording.png import encode
 from semgrid_eval.recording.types import CameraFrame
 from semgrid_eval.sources.benchmarks import Stereo
+from semgrid_eval.sources.matching import SemiGlobalMatching
 from semgrid_eval.sources.town.picture_errors import PictureErrors, Strengths, coded_disparity
 from semgrid_eval.sources.town.sensors import Camera, View
 from semgrid_eval.sources.town.varied import Conditions
 
-NEAREST_M = 3.0
-"""What is nearer than this is not matched."""
-_BLOCK_PX = 5
-_SUBPIXELS = 16
 _SENSOR_NOISE = 2.0  # standard deviation in grey levels; without it even a clear sky would match
 # Speed counts more than size here. OpenCV before 4.12 has no choice of filter and ignores it.
 _FILTER, _NO_FILTER, _FILTER_UP = 19, 8, 32
@@ -28,7 +24,7 @@ _GREY_PNG = [*_PNG, cv2.IMWRITE_PNG_STRATEGY_RLE, _FILTER, _FILTER_UP]
 
 
 class StereoMatcher:
-    """OpenCV's semi-global matching along three paths, for the pairs of one camera.
+    """Semi-global matching of the pairs of one camera, as sensors expose them.
 
     Matching cannot see what lies left of the right image's edge, so pairs are rendered `margin_px` wider on the left,
     which the result leaves out again.
@@ -36,29 +32,15 @@ class StereoMatcher:
 
     def __init__(self, camera: Camera, rng: np.random.Generator) -> None:
         self._rng = rng
-        farthest_px = camera.calibration.fx_px * camera.calibration.baseline_m / NEAREST_M
-        self.margin_px = 16 * math.ceil(farthest_px / 16)
+        self._matching = SemiGlobalMatching(camera.calibration)
+        self.margin_px = self._matching.margin_px
         wider = replace(camera.calibration, u0_px=camera.calibration.u0_px + self.margin_px)
         left = Camera(wider, camera.width_px + self.margin_px, camera.height_px)
         self.cameras = (left, right_of(left))
-        self._matching = cv2.StereoSGBM.create(
-            minDisparity=0,
-            numDisparities=self.margin_px,
-            blockSize=_BLOCK_PX,
-            P1=8 * _BLOCK_PX**2,
-            P2=32 * _BLOCK_PX**2,
-            disp12MaxDiff=1,
-            uniquenessRatio=8,
-            speckleWindowSize=60,
-            speckleRange=2,
-            mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
-        )
 
     def disparity_px(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Match two colour images (H, margin + W, 3) and return the disparity (H, W); 0 where there is none."""
-        grey = [self._exposed(image) for image in (left, right)]
-        found = self._matching.compute(*grey)[:, self.margin_px :]
-        return np.maximum(found, 0).astype(np.float32) / np.float32(_SUBPIXELS)
+        return self._matching.disparity_px(self._exposed(left), self._exposed(right))[:, self.margin_px :]
 
     def _exposed(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return the grey image (H, W) of a sensor with noise of its own."""

@@ -39,6 +39,24 @@ def test_windows_of_one_car_do_not_overlap_and_lie_inside_its_track():
         assert path.times_s[-1] > drive.start_s + FRAME_COUNT / FRAME_RATE_HZ
 
 
+def test_long_windows_are_inside_the_track_apart_and_looked_at_all_the_way():
+    frames = 120
+    traffic = cars([0.0, 3.0, 5.0, 7.0, 9.0])
+    chosen = choose_drives(traffic, 8, np.random.default_rng(1), frames)
+    assert {drive.frames for drive in chosen} == {frames}
+    for actor in range(5):
+        starts = sorted(drive.start_s for drive in chosen if drive.actor == actor)
+        assert (np.diff(starts) > frames / FRAME_RATE_HZ).all()
+    for drive in chosen:
+        assert ego_path(traffic, drive).times_s[-1] > drive.start_s + frames / FRAME_RATE_HZ
+    # Somebody stands 50 m ahead, where a car of 9 m/s comes after a drive of 30 frames has ended.
+    inside = cars([9.0, 0.0], types=[CAR, PERSON], starts_m=[(0.0, 0.0), (70.0, 0.2)])
+    free = choose_drives(inside, 1, np.random.default_rng(0))[0]
+    assert not free.start_s < inside.times_s[0] + 7.0 < free.start_s + 1.0
+    with pytest.raises(InputError, match="holds only 0 of 1 windows of 330 frames"):
+        choose_drives(inside, 1, np.random.default_rng(0), 330)
+
+
 def test_only_cars_carry_the_camera():
     traffic = cars([5.0, 5.0, 1.0], types=[BUS, CAR, PERSON])
     assert {drive.actor for drive in choose_drives(traffic, 3, np.random.default_rng(0))} == {1}
