@@ -15,6 +15,7 @@ import numpy as np
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import MOVING, STANDING, GridSpec
 from semgrid_eval.scores import results
+from semgrid_eval.scores.facts import RowFacts
 from semgrid_eval.scores.metrics.metric import ScoredWindows
 from semgrid_eval.scores.metrics.table import Sums, count_windows
 
@@ -74,7 +75,7 @@ def _row(
     base: Sums,
     generator: np.random.Generator,
 ) -> results.RowRecord:
-    facts = results.RowFacts(
+    facts = RowFacts(
         model="newest" if number == 0 else "ed",
         family="BL" if number == 0 else "ED",
         learns=number > 0,
@@ -99,7 +100,7 @@ def _row(
 
 
 def _result(
-    result_id: str, seed: int, facts: results.RowFacts, windows: tuple[results.WindowRecord, ...]
+    result_id: str, seed: int, facts: RowFacts, windows: tuple[results.WindowRecord, ...]
 ) -> results.ResultRecord:
     return results.ResultRecord(
         format_version=results.FORMAT_VERSION,

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_files
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.facts import StreamRecord
@@ -56,7 +57,10 @@ def latencies_of(row: Row) -> Latencies:
     if how.profile is None:
         return lambda name, frames: np.full(frames, constant_ns, np.int64)
     profile, model = read_profile(Path(how.profile)), how.profile_model or row.model
-    profile.chain_ms(model)  # a model that it lacks is told before anything is planned
+    try:
+        profile.chain_ms(model)
+    except InputError as error:  # it lacks the model
+        raise InputError(str(error), path=Path(how.profile)) from None
     return partial(_drawn, profile, model, seed=how.seed, scale=how.scale, added_ns=constant_ns)
 
 

@@ -134,3 +134,26 @@ def test_a_profile_that_is_not_there_is_the_failure_of_its_row_alone(logs, tmp_p
     record = run(rows, logs, tmp_path / "run")
     assert [row.failure is None for row in record.rows] == [True, False]
     assert "gone.json" in record.rows[1].failure
+
+
+def test_latencies_of_a_profile_are_drawn_by_recording_and_a_model_that_it_lacks_is_named(logs, tmp_path):
+    made_by = {"command": "test", "version": "0", "machine": {}}
+    profile = {"format": 1, "made_by": made_by, "stages": {"grid": [50.0, 90.0]}, "models": {"newest": [10.0, 30.0]}}
+    path = tmp_path / "latency.json"
+    path.write_text(json.dumps(profile))
+    rows = [
+        {"name": "newest", "model": "newest", "stream": {"profile": str(path), "scale": 2, "added_ms": 5}},
+        {"name": "other", "model": "newest", "stream": {"profile": str(path), "scale": 2, "added_ms": 5, "seed": 1}},
+        {"name": "fuse", "model": "fuse", "stream": {"profile": str(path), "asked": "known"}},
+    ]
+    record = run(rows, logs, tmp_path / "run")
+    first, other = (
+        results.read_result(results.result_folder(tmp_path / "run", row.results[0])) for row in record.rows[:2]
+    )
+    assert first.stream.latency_ms in (125.0, 185.0, 245.0)
+    assert first.id != other.id
+    assert "latency.json" in record.rows[2].failure
+    assert "model fuse: was not measured; the profile has: newest" in record.rows[2].failure
+    path.write_text(json.dumps({**profile, "stages": {"grid": [50.0, 91.0]}}))
+    again = run(rows, logs, tmp_path / "run")
+    assert again.rows[0].results[0] != record.rows[0].results[0], "another profile, another result"

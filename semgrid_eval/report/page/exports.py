@@ -1,8 +1,6 @@
-"""What a report is written from, and its files beside the page: long tables, the page's own, figures, report.json."""
+"""A report's files beside the page: long tables, the page's own, figures, report.json."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,44 +10,31 @@ import pandas as pd
 from semgrid_eval import __version__
 from semgrid_eval.files import write_json, write_text
 from semgrid_eval.report.claims.claims import scaling
-from semgrid_eval.report.claims.findings import Finding, find, finding_frame, finding_records
+from semgrid_eval.report.claims.findings import finding_frame, finding_records
 from semgrid_eval.report.estimates.bootstrap import (
     LEVEL,
     Estimate,
     Everything,
-    Resampling,
     RowScores,
     Scores,
     everywhere,
-    score_all,
-    score_regions,
 )
-from semgrid_eval.report.estimates.division import of_cells
-from semgrid_eval.report.estimates.leads import best_leads, lead_series
-from semgrid_eval.report.estimates.paces import divisions
-from semgrid_eval.report.estimates.streams import WARM, Strategy, strategies
-from semgrid_eval.report.estimates.way import Way, against_expected, order_of, ways
-from semgrid_eval.report.figures import categories, curves, settings
+from semgrid_eval.report.estimates.way import Way, ways
 from semgrid_eval.report.figures.curves import calibration_frame, timing_frame, training_frame
 from semgrid_eval.report.figures.settings import settings_frame
-from semgrid_eval.report.figures.streams import stream_frame, stream_plots
+from semgrid_eval.report.figures.streams import stream_frame
 from semgrid_eval.report.figures.style import Plot
+from semgrid_eval.report.page.material import Material
 from semgrid_eval.report.page.provenance import data_sets, failures, matrix_file, matrix_text, window_frame
 from semgrid_eval.report.rows.load import Row, Run
-from semgrid_eval.report.rows.pairing import main_group
 from semgrid_eval.report.tables.formats.csv import as_csv, frame_csv
 from semgrid_eval.report.tables.formats.json import as_json
 from semgrid_eval.report.tables.formats.latex import as_latex
 from semgrid_eval.report.tables.formats.markdown import as_markdown
 from semgrid_eval.report.tables.numbers import finite
-from semgrid_eval.report.tables.scores import division_tables, score_tables
-from semgrid_eval.report.tables.streams import lead_table, stream_table, wins_table
 from semgrid_eval.report.tables.table import Table
-from semgrid_eval.report.tables.truth import expected_table, order_sentence, way_table
 from semgrid_eval.report.tables.values import reference_scores
 from semgrid_eval.scores.metrics.metric import column_names
-from semgrid_eval.scores.metrics.table import IOU
-from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.tidy import FIGURE_COLUMNS
 
 LEADS_FILE = "leads.json"
@@ -82,96 +67,9 @@ Records = Mapping[str, Mapping[str, Mapping[str, Mapping[str, dict[str, Any]]]]]
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Material:
-    """All that a report is written from; tables and figures by section of the page."""
-
-    runs: Sequence[Run]
-    resampling: Resampling
-    everything: Everything
-    scores: Scores  # the IoU of all cells, of the rows that stand in the tables of all rows
-    findings: Sequence[Finding]
-    tables: Mapping[str, Table | None]  # of the IoU of all cells
-    parts: Mapping[str, Sequence[Table]]  # of every metric, by division
-    figures: Mapping[str, Sequence[Plot]]
-    expected: Everything  # IoU against what is measured on average, of the rows that are scored so
-    order: str  # whether the order of rows is another one there, in a sentence
-    streams: Sequence[Strategy] = ()
-    best_leads: Mapping[str, float] = field(default_factory=dict)  # in ms by category
-
-    @cached_property
-    def records(self) -> Records:
-        """What machines may want to know."""
-        return division_records(self.everything)
-
-
-def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
-    """Work out everything that a report shows."""
-    rows, parts = [row for each in runs for row in each.rows], divisions(runs)
-    everything = score_all(rows, parts, resampling)
-    streams, moving = strategies(everywhere(everything, "iou")), everything["iou"]["actors"].get("moving", {})
-    whole, everything = everything, shown_rows(everything, streams)
-    scores = everywhere(everything, "iou")
-    findings = find(runs, scores, everything["iou"]["actors"])
-    tables = score_tables(scores, [each.tag for each in runs])
-    figures = {
-        "categories": categories.category_plots(scores),
-        "horizon": categories.horizon_plots(scores),
-        "training": curves.training_plots(rows),
-        "calibration": curves.calibration_plots(everywhere(everything, "calibration")),
-        "settings": settings.settings_plots(scores),
-        "streams": stream_plots(streams, moving),
-    }
-    warm = everything["iou"]["warm_up"].get(WARM, {})
-    leads = lead_series(scores)
-    tables |= {"streams": stream_table(streams, warm, moving), "stream_wins": wins_table(streams)}
-    tables |= {"stream_leads": lead_table(leads)}
-    tables |= {"way": way_table(scores, everything["iou"]["actors"].get("moving", {}), rows), "expected": None}
-    expected, order = score_expected(rows, resampling), ""
-    if scored := everywhere(expected, "iou"):
-        found = order_of(scores, scored, main_group([entry.row for entry in scored.values()])[0].targets)
-        tables["expected"], order = expected_table(scored, found), order_sentence(scores, scored, found)
-    in_parts = division_tables(everything, parts)
-    return Material(
-        runs,
-        resampling,
-        whole,
-        scores,
-        findings,
-        tables,
-        in_parts,
-        figures,
-        expected,
-        order,
-        tuple(streams),
-        best_leads(leads),
-    )
-
-
-def shown_rows(everything: Everything, streams: Sequence[Strategy]) -> Everything:
-    """Leave out the rows that differ from others in their latency alone: they have a section of their own."""
-    hidden = {entry.row.name for each in streams for entry in each.entries if entry is not each.measured}
-    return {
-        metric: {
-            division: {
-                region: {name: entry for name, entry in scores.items() if name not in hidden}
-                for region, scores in parts.items()
-            }
-            for division, parts in divisions.items()
-        }
-        for metric, divisions in everything.items()
-    }
-
-
-def score_expected(rows: Sequence[Row], resampling: Resampling) -> Everything:
-    """Score rows against what is measured on average, of all cells and near actors."""
-    parts = [of_cells(PARTITIONS[name]) for name in ("all", "actors")]
-    return {"iou": {part.name: score_regions(against_expected(rows), IOU, part, resampling) for part in parts}}
-
-
-def write_numbers(folder: Path, material: Material) -> None:
+def write_numbers(folder: Path, material: Material, records: Records) -> None:
     """Write the long tables as CSV, and each run's matrix."""
-    runs, records = material.runs, material.records
+    runs = material.runs
     frames = {
         "summary": summary_frame(records),
         "expected": summary_frame(division_records(material.expected)),
@@ -192,10 +90,10 @@ def write_numbers(folder: Path, material: Material) -> None:
         write_json(folder / LEADS_FILE, {"lead_ms": dict(material.best_leads)})
 
 
-def write_record(folder: Path, material: Material) -> None:
+def write_record(folder: Path, material: Material, records: Records) -> None:
     """Write report.json when all else is written, and list there what that is."""
     files = sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
-    record = report_record(material, material.records)
+    record = report_record(material, records)
     write_json(folder / RECORD, record | {FILES: [*files, RECORD]})
 
 

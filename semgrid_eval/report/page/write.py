@@ -20,7 +20,8 @@ from semgrid_eval.report.estimates.paces import EDGES_MPS
 from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, class_style, data_uri
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
 from semgrid_eval.report.page import exports, provenance
-from semgrid_eval.report.page.exports import PAGE, Material, gather
+from semgrid_eval.report.page.exports import PAGE
+from semgrid_eval.report.page.material import Material, gather
 from semgrid_eval.report.page.replace import check_replaceable, keep_foreign
 from semgrid_eval.report.rows.load import Row, Run, key_of, load_runs
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, Headline, headline, verdict
@@ -88,11 +89,12 @@ def write_report(
     with locked(out.parent, f".{out.name}.lock"):
         check_replaceable(out)
         with atomic_folder(out) as folder:
-            exports.write_numbers(folder, material)
+            records = exports.division_records(material.everything)
+            exports.write_numbers(folder, material, records)
             exports.write_tables(folder, material)
             exports.write_figures(folder, material.figures)
             (folder / PAGE).write_text(render_page(material), encoding="utf-8")
-            exports.write_record(folder, material)
+            exports.write_record(folder, material, records)
             keep_foreign(out, folder)
     for each in material.runs:
         for fault in each.damages:
