@@ -96,6 +96,8 @@ def check_log(path: Path) -> LogReport:
 def _findings(log: LogReader, stamps_ns: dict[str, list[int]]) -> Iterator[Finding]:
     if not log.has_checksums:
         yield _warning("file", "has no checksums, so damage cannot be seen")
+    if recovered := log.recovered():
+        yield _warning("file", str(recovered))
     if not log.scene.cameras:
         yield _error("cameras", "there is none")
     label_ids: set[int] = set()

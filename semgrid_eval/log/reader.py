@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from semgrid_eval.errors import InputError, LogError
-from semgrid_eval.log import codec, topics
+from semgrid_eval.log import codec, recovered, topics
 from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene
 from semgrid_eval.log.container import Container, damage_as_log_error
+from semgrid_eval.log.recovered import Recovered
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Quantity
 
@@ -67,6 +68,11 @@ class LogReader(Container):
         entries = self.metadata(CONDITIONS_RECORD) or {}
         with damage_as_log_error(self.path):
             return codec.read_conditions(entries)
+
+    def recovered(self) -> Recovered | None:
+        """Return what the log says of its recovery from a damaged one, None where it is no such log."""
+        entries = self.metadata(recovered.RECORD)
+        return None if entries is None else Recovered.from_metadata(entries)
 
     def choose_camera(self, wanted: str | None) -> str:
         """Return the camera that is wanted, or the log's only one where none is.
