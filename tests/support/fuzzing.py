@@ -21,6 +21,7 @@ from support.mutations import KINDS as KEPT
 from support.mutations import make_run
 
 from semgrid_eval.classes import label_palette
+from semgrid_eval.config import load_yaml
 from semgrid_eval.files import digest_value
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.contract import contract_text, load_contract
@@ -34,6 +35,17 @@ from semgrid_eval.sources.cityscapes.files import read_camera, read_stamp, read_
 
 Inputs = Mapping[str, bytes]
 CORPUS = Path(__file__).parents[1] / "corpus"
+"""Inputs that were found to be bad, a folder for each of these kinds."""
+READERS: dict[str, Callable[[Path], object]] = {
+    "camera": read_camera,
+    "contract": load_contract,
+    "log": lambda path: LogReader(path).close(),
+    "matrix": lambda path: load_matrix(str(path)),
+    "png": lambda path: require_pixels(path.read_bytes(), path),
+    "timestamp": read_stamp,
+    "vehicle": lambda path: read_vehicle(path, 0),
+    "yaml": load_yaml,
+}
 PRESETS = Path(__file__).parents[2] / "semgrid_eval" / "presets"
 
 
@@ -242,7 +254,7 @@ def resealed(inputs: Inputs, name: str, chance: random.Random) -> bytes:
     writer = Writer(out, chunk_size=chance.choice((64, 4096, 1 << 20)), enable_data_crcs=True)
 
     def changed(data: bytes) -> bytes:
-        return anyhow({"": data}, "", chance) if chance.random() < odd else data
+        return _changed(data, chance) if chance.random() < odd else data
 
     def text(word: str) -> str:
         return changed(word.encode()).decode("utf-8", "replace")
@@ -289,51 +301,54 @@ def read_png(folder: Path, name: str) -> object:
     return header, decode_ids(data).tobytes(), decode_gray(data, bit_depth=8).tobytes(), decode_colour(data).tobytes()
 
 
+def all_png_inputs(folder: Path) -> dict[str, bytes]:
+    return png_inputs(folder) | corpus("png")
+
+
 def resealed_png(inputs: Inputs, name: str, chance: random.Random) -> bytes:
     """Change chunks of a PNG file, and make their checksums hold."""
     data, at, out = inputs[name], 8, inputs[name][:8]
-    while at < len(data):
+    while at + 12 <= len(data):
         (length,) = struct.unpack_from(">I", data, at)
         kind, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + length]
         if chance.random() < 0.4:
-            raw = zlib.decompress(body) if kind == b"IDAT" and chance.random() < 0.7 else None
-            body = anyhow({"": body if raw is None else raw}, "", chance)
-            body = body if raw is None else zlib.compress(body)
+            body = repacked(body, chance) if kind == b"IDAT" and chance.random() < 0.7 else _changed(body, chance)
         out += struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
         at += 12 + length
-    return out
+    return out if out != data else data + b"\0"
+
+
+def repacked(body: bytes, chance: random.Random) -> bytes:
+    """Change pixels, and pack them again."""
+    try:
+        return zlib.compress(_changed(zlib.decompress(body), chance))
+    except zlib.error:
+        return _changed(body, chance)
+
+
+def _changed(data: bytes, chance: random.Random) -> bytes:
+    return anyhow({"": data}, "", chance)
 
 
 def json_inputs(folder: Path) -> dict[str, bytes]:
     vehicle = {"speed": 5.5, "yawRate": 0.1, "gpsLatitude": 49.1, "gpsLongitude": 8.2, "gpsHeading": None}
-    made = {
-        "camera.json": json.dumps(CAMERA).encode(),
-        "vehicle.json": json.dumps(vehicle).encode(),
-        "stamp.txt": b"17\n",
-    }
-    return made | corpus("camera", "vehicle", "timestamp")
-
-
-def read_json_input(folder: Path, name: str) -> object:
-    path = folder / name
-    if "camera" in name:
-        return read_camera(path)
-    return read_vehicle(path, 0) if "vehicle" in name else read_stamp(path)
+    made = {"camera/whole": json.dumps(CAMERA).encode(), "vehicle/whole": json.dumps(vehicle).encode()}
+    return made | {"timestamp/whole": b"17000\n"} | corpus("camera", "vehicle", "timestamp")
 
 
 def yaml_inputs(folder: Path) -> dict[str, bytes]:
     made = {"contract/default.yaml": contract_text(default_contract()).encode()}
     made |= {f"matrix/{path.name}": path.read_bytes() for path in PRESETS.glob("*.yaml")}
-    return made | corpus("config", "contract", "matrix")
+    return made | corpus("contract", "matrix", "yaml")
 
 
-def read_yaml_input(folder: Path, name: str) -> object:
-    return load_matrix(str(folder / name)) if name.startswith("matrix") else load_contract(folder / name)
+def read_of_kind(folder: Path, name: str) -> object:
+    return READERS[name.partition("/")[0]](folder / name)
 
 
 def corpus(*kinds: str) -> dict[str, bytes]:
-    """Inputs that were found to be bad, by kind and name."""
-    paths = [path for kind in kinds for path in sorted((CORPUS / kind).glob("*")) if path.name != "expected.json"]
+    """Bad inputs by kind and name."""
+    paths = [path for kind in kinds for path in sorted((CORPUS / kind).iterdir()) if path.name != "expected.json"]
     return {f"{path.parent.name}/{path.name}": path.read_bytes() for path in paths}
 
 
@@ -365,8 +380,8 @@ KINDS: dict[str, Kind] = {
     "recovery": Kind(log_inputs, recovered, anyhow, agrees=recovery_agrees),
     "resealed log": Kind(log_inputs, read_log, resealed, has_checksums=False),
     "png": Kind(png_inputs, read_png, anyhow),
-    "resealed png": Kind(png_inputs, read_png, resealed_png, has_checksums=False),
-    "json": Kind(json_inputs, read_json_input, words, has_checksums=False),
-    "yaml": Kind(yaml_inputs, read_yaml_input, words, has_checksums=False),
+    "resealed png": Kind(all_png_inputs, read_png, resealed_png, has_checksums=False),
+    "json": Kind(json_inputs, read_of_kind, words, has_checksums=False),
+    "yaml": Kind(yaml_inputs, read_of_kind, words, has_checksums=False),
     **{kind: _kept(kind) for kind in KEPT},
 }
