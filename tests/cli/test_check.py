@@ -1,19 +1,25 @@
 import json
+import re
 import shlex
 from importlib.resources import files
+from pathlib import Path
 
 import jsonschema
 import pytest
+import yaml
 from support.damage import flipped, zeroed
 from support.driving import driving
 
 from semgrid_eval.cli.check import command
 from semgrid_eval.cli.main import main
-from semgrid_eval.log.contract import contract_text
+from semgrid_eval.config import parse_config
+from semgrid_eval.log.contract import Contract, TopicContract, contract_text
 from semgrid_eval.log.default_contract import default_contract
 from semgrid_eval.log.findings import MOST_FINDINGS
+from semgrid_eval.log.quantities import quantities_of
 from semgrid_eval.log.store import write_log
 
+PAGE = (Path(__file__).parents[2] / "docs" / "check.md").read_text(encoding="utf-8")
 SCHEMA = json.loads(files("semgrid_eval").joinpath("data/check.schema.json").read_text())
 
 
@@ -171,3 +177,24 @@ def test_nothing_is_overwritten_by_a_recovery(damaged, tmp_path, capsys):
     (damaged / "a.mcap").write_bytes(before)
     assert run("check", damaged / "a.mcap", damaged / "val", "--recover", tmp_path / "new") == 1
     assert "two logs have this name" in capsys.readouterr().err
+
+
+def test_commands_and_contract_of_the_page_are_sound(logs, monkeypatch):
+    monkeypatch.chdir(logs.parent)
+    Path("recording.yaml").touch()
+    shown = re.search(r"```sh\n(.*?)```", PAGE, re.DOTALL)[1].splitlines()
+    assert len(shown) == 4
+    for line in shown:
+        command.make_context("check", shlex.split(line)[2:])
+    (contract,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    assert len(parse_config(Contract, yaml.safe_load(contract)).latencies) == 2
+
+
+def test_the_page_names_every_field_and_value():
+    names = {*Contract.model_fields, *TopicContract.model_fields} - {"topics"}
+    topics = ("/ego/motion", *(f"/camera/NAME/{each}" for each in ("calibration", "stereo", "disparity", "label")))
+    values = {name for topic in topics for name in quantities_of(topic)}
+    told = re.findall(r"`(?:topics\.TOPIC\.|\.\.\. )?([^`]*)`", PAGE)
+    assert (names | values) - {"values"} <= {part for each in told for part in (each, each.removeprefix("... "))}
+    for topic in topics:
+        assert f"| `{topic}` |" in PAGE
