@@ -15,9 +15,9 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from support import fuzzing
@@ -55,24 +55,25 @@ class Tally:
 
     outcomes: Counter[str]
     failures: list[Failure]
+    seconds: float = 0.0
 
 
-def run_kind(name: str, kind: Kind, count: int, folder: Path, *, until_s: float = float("inf")) -> Tally:
-    """Make and read so many cases of a kind, fewer where time is over before (a reading of `time.monotonic`)."""
+def run_kind(name: str, kind: Kind, count: int, folder: Path, *, seconds: float = float("inf")) -> Tally:
+    """Make and read so many cases of a kind, fewer where the time for them is over before."""
     inputs = kind.inputs(folder)
     expected: dict[str, object] = {}
     for each in inputs:
         kind.put(folder, each, inputs[each])
         expected[each] = kind.read(folder, each) if kind.has_checksums else None
-    tally = Tally(Counter(), [])
+    tally, begin_s = Tally(Counter(), []), time.monotonic()
     for case in cases(name, kind, inputs, count):
-        if time.monotonic() > until_s:
+        if time.monotonic() - begin_s > seconds:
             break
         outcome, told = judged(kind, case, inputs, expected, folder)
         tally.outcomes[outcome] += 1
         if outcome in FAILURES:
             tally.failures.append((case, outcome, told))
-    return tally
+    return replace(tally, seconds=time.monotonic() - begin_s)
 
 
 def cases(name: str, kind: Kind, inputs: Mapping[str, bytes], count: int) -> Iterator[Case]:
@@ -139,33 +140,37 @@ def line(name: str, outcomes: Counter[str]) -> str:
     return f"{name:<22}{outcomes.total():>8}{counts}\n"
 
 
+def run_kinds(names: Sequence[str], count: int, seconds: float, folder: Path) -> tuple[Counter[str], list[Failure]]:
+    """Run several kinds, each in its share of the time that those before have left, and print a line for each."""
+    outcomes, failures = Counter[str](), list[Failure]()
+    for left, name in zip(range(len(names), 0, -1), names, strict=True):
+        tally = run_kind(name, fuzzing.KINDS[name], count, folder, seconds=seconds / left)
+        seconds -= tally.seconds
+        outcomes.update(tally.outcomes)
+        failures.extend(tally.failures)
+        sys.stdout.write(line(name, tally.outcomes))
+        sys.stdout.flush()
+    return outcomes, failures
+
+
 def main() -> int:
     """Fuzz all kinds, or some, and print what became of the cases; the exit code is 1 if there is a failure."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--count", type=int, default=500, help="cases of each kind")
-    parser.add_argument("--seconds", type=float, default=600.0, help="for all kinds together")
+    parser.add_argument("--seconds", type=float, default=600.0, help="for the cases of all kinds together")
     parser.add_argument("--kinds", nargs="*", default=[*fuzzing.KINDS], choices=[*fuzzing.KINDS], metavar="KIND")
     parser.add_argument("--keep", type=Path, help="folder for inputs that failed")
     given = parser.parse_args()
-    begin: Callable[[], float] = time.monotonic
-    until_s, total = begin() + given.seconds, Tally(Counter(), [])
-    sys.stdout.write(
-        f"{'kind':<22}{'cases':>8}" + "".join(f"{each:>17}" for each in (SAME, REFUSED, OTHER, *FAILURES)) + "\n"
-    )
-    for left, name in zip(range(len(given.kinds), 0, -1), given.kinds, strict=True):
-        share_s = begin() + (until_s - begin()) / left
-        with tempfile.TemporaryDirectory() as folder:
-            tally = run_kind(name, fuzzing.KINDS[name], given.count, Path(folder), until_s=share_s)
-        total.outcomes.update(tally.outcomes)
-        total.failures.extend(tally.failures)
-        sys.stdout.write(line(name, tally.outcomes))
-        sys.stdout.flush()
-    sys.stdout.write(line("all", total.outcomes))
-    for case, outcome, told in total.failures[:20]:
+    heads = "".join(f"{each:>17}" for each in (SAME, REFUSED, OTHER, *FAILURES))
+    sys.stdout.write(f"{'kind':<22}{'cases':>8}{heads}\n")
+    with tempfile.TemporaryDirectory() as folder:
+        outcomes, failures = run_kinds(given.kinds, given.count, given.seconds, Path(folder))
+    sys.stdout.write(line("all", outcomes))
+    for case, outcome, told in failures[:20]:
         sys.stdout.write(f"{case.kind} {case.number} ({case.name}): {outcome}: {told}\n")
     if given.keep is not None:
-        keep(total.failures, given.keep)
-    return 1 if total.failures else 0
+        keep(failures, given.keep)
+    return 1 if failures else 0
 
 
 if __name__ == "__main__":

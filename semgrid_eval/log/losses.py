@@ -13,6 +13,7 @@ from mcap.opcode import Opcode
 from semgrid_eval.log.records import Index
 from semgrid_eval.log.salvage import Hole, Part, body_of
 
+_INDEX_BYTES, _ENTRY_BYTES = 15, 16  # of a message index with no message, and more for each
 Times = Sequence[int]
 """Times of messages (ns)."""
 
@@ -90,17 +91,27 @@ class Contents:
             yield step
 
     def _indexed(self, chunk: records.ChunkIndex, topics: Mapping[int, str]) -> Iterator[LostMessages]:
-        for channel, offset in chunk.message_index_offsets.items():
+        """Say what a chunk held: by its message indexes, or by how long the index of the file says that they are."""
+        times_ns = chunk.message_start_time, chunk.message_end_time
+        for channel, offset, size in _places_of_indexes(chunk):
             step = self._steps[self._places[offset]] if offset in self._places else None
             if isinstance(step, Part) and step.opcode == Opcode.MESSAGE_INDEX:
                 yield _lost(topics, *self._message_index(step))
             else:
-                times_ns = chunk.message_start_time, chunk.message_end_time
-                yield LostMessages(_topic(topics, channel), None, *times_ns)
+                count, rest = divmod(size - _INDEX_BYTES, _ENTRY_BYTES)
+                yield LostMessages(_topic(topics, channel), None if rest else count, *times_ns)
 
     def _message_index(self, part: Part) -> tuple[int, Times]:
         found = records.MessageIndex.read(ReadDataStream(io.BytesIO(body_of(self._stream, part))))
         return found.channel_id, [time_ns for time_ns, _ in found.records]
+
+
+def _places_of_indexes(chunk: records.ChunkIndex) -> Iterator[tuple[int, int, int]]:
+    """Iterate over the channels of a chunk, where their message indexes begin, and how many bytes they have."""
+    places = sorted((offset, channel) for channel, offset in chunk.message_index_offsets.items())
+    end = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
+    ends = [*(offset for offset, _ in places[1:]), end]
+    return ((channel, offset, after - offset) for (offset, channel), after in zip(places, ends, strict=True))
 
 
 def lost_messages(times_ns: Mapping[int, Times], topics: Mapping[int, str]) -> tuple[LostMessages, ...]:

@@ -118,6 +118,9 @@ def test_zeros_over_two_chunks_and_their_headers_cost_those_two(whole, recover):
     found = recover(data)
     assert saved(found) == of(untouched(whole, data))
     assert sum(found.lost.values()) == len(everything(whole)) - len(saved(found))
+    told = [each for loss in found.losses for each in loss.messages]  # their message indexes are lost with them
+    assert sum(each.count for each in told) == len(everything(whole)) - len(saved(found))
+    assert {each.topic for each in told} == found.lost.keys()
     found = recover(data[:-40])  # without index
     assert saved(found) == of(untouched(whole, data))
 
