@@ -104,10 +104,14 @@ def read_conditions(entries: Mapping[str, str]) -> dict[str, Quantity]:
     """Read the entries of the metadata record of conditions.
 
     Raises:
-        ValueError: one does not begin with a number.
+        ValueError: one does not begin with a finite number.
     """
     parts = {name: text.partition(" ") for name, text in entries.items()}
-    return {name: Quantity(json.loads(value), unit) for name, (value, _, unit) in parts.items()}
+    found = {name: Quantity(json.loads(value), unit) for name, (value, _, unit) in parts.items()}
+    for name, each in found.items():
+        if type(each.value) not in (int, float) or not math.isfinite(each.value):
+            raise ValueError(f"its condition {name[:_SHOWN]!r} is not a number")
+    return found
 
 
 def require_file_name(text: str, what: str) -> None:

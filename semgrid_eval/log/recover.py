@@ -201,7 +201,9 @@ def _definition(opcode: int, body: bytes) -> records.McapRecord:
 
 
 def _data_hold(stream: BinaryIO, steps: Steps) -> bool:
-    """Tell whether there is a checksum of all data, and it holds."""
+    """Tell whether there is a checksum of all data, and it holds; it cannot where the way through them was lost."""
+    if any(isinstance(step, Hole) and step.opcode is None for step in steps):
+        return False
     for part in _parts(steps[-1:], Opcode.DATA_END):
         expected = records.DataEnd.read(ReadDataStream(io.BytesIO(body_of(stream, part)))).data_section_crc
         return bool(expected) and data_crc(stream, part.begin) == expected

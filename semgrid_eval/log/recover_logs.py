@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.errors import InputError
 from semgrid_eval.log.recover import recover_log
 from semgrid_eval.log.recovery import Recovery
 from semgrid_eval.log.store import find_logs
@@ -54,17 +54,13 @@ def targets(logs: Sequence[Path], out: Path) -> dict[Path, Path]:
 
 
 def recover_logs(found: Mapping[Path, Path], progress: Progress) -> Iterator[Outcome]:
-    """Recover each log to its target, one after the other.
-
-    Raises:
-        InputError: a new log cannot be written.
-    """
+    """Recover each log to its target; one that cannot be read or written is told, and the others go on."""
     for folder in {target.parent for target in found.values()}:
         remove_stale(folder)
     for done, (path, target) in enumerate(found.items(), start=1):
         try:
             yield Outcome(path, target, recover_log(path, target))
-        except LogError as error:
+        except InputError as error:
             yield Outcome(path, target, None, str(error).removeprefix(f"{path}: "))
         progress(done, len(found), path.name)
 

@@ -5,7 +5,9 @@ have one; they count where they are reached from a whole record and end where th
 proves itself is found again, so that the content of a damaged chunk is never taken for records.
 """
 
+import errno
 import io
+import os
 import re
 from collections.abc import Iterable, Iterator
 from typing import Any, BinaryIO, NamedTuple
@@ -208,13 +210,27 @@ class _Walk:
         return self._end
 
     def _search(self, at: int) -> Iterator[int]:
-        while at < self._end:
+        while (at := _data_from(self._stream, at, self._end)) < self._end:
             self._stream.seek(at)
             block = self._stream.read(_BLOCK_BYTES + HEADER.size)
             for found in _PROVABLE.finditer(block):
                 if found.start() < _BLOCK_BYTES:
                     yield at + found.start()
             at += _BLOCK_BYTES
+
+
+def _data_from(stream: BinaryIO, at: int, end: int) -> int:
+    """Return the first place from here on that is not in a hole of a sparse file, which reads as zeros."""
+    if not hasattr(os, "SEEK_DATA"):
+        return at
+    descriptor = stream.fileno()
+    before = os.lseek(descriptor, 0, os.SEEK_CUR)
+    try:
+        return os.lseek(descriptor, at, os.SEEK_DATA)
+    except OSError as error:  # there are no more data, or the file system does not tell
+        return end if error.errno == errno.ENXIO else at
+    finally:
+        os.lseek(descriptor, before, os.SEEK_SET)  # where the stream believes it to be
 
 
 def _anchors(index: Index) -> Iterable[int]:

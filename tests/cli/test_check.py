@@ -152,6 +152,17 @@ def test_what_is_whole_is_saved_and_what_is_lost_is_told(damaged, tmp_path, caps
     assert run("check", tmp_path / "out") == 0
 
 
+def test_a_new_log_that_cannot_be_written_is_told_and_the_others_are_saved(damaged, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/val").touch()
+    whole = (damaged / "val/a.mcap").read_bytes()
+    (damaged / "zeros.mcap").write_bytes(whole)
+    assert run("check", damaged, "--recover", tmp_path / "out") == 3
+    said = capsys.readouterr().out
+    assert f"{damaged}/val/cut.mcap: not recovered: {tmp_path}/out/val/cut.mcap: cannot be written: " in said
+    assert (tmp_path / "out/zeros.mcap").read_bytes() == whole
+
+
 def test_exit_codes_and_json_of_a_recovery(damaged, tmp_path, capsys):
     assert run("check", damaged / "val/a.mcap", "--recover", tmp_path / "whole") == 0
     capsys.readouterr()

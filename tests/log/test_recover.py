@@ -1,3 +1,4 @@
+import os
 import random
 
 import pytest
@@ -247,6 +248,18 @@ def test_what_is_no_log_is_one_error_and_leaves_nothing(recover, tmp_path, data)
     with pytest.raises(LogError, match=r"log\.mcap: holds no message that can be saved"):
         recover(data)
     assert not list((tmp_path / "out").iterdir())
+
+
+def test_the_holes_of_a_sparse_file_are_not_read(whole, recover, tmp_path):
+    path = tmp_path / "log.mcap"
+    path.write_bytes(whole[: stretches(whole)[-1].begin])  # up to the end of its data
+    os.truncate(path, 1 << 40)
+    with path.open("r+b") as stream:
+        stream.seek((1 << 40) - (1 << 20))
+        stream.write(whole[chunks(whole)[2].begin :])
+    found = recover_log(path, tmp_path / "out.mcap")
+    again = [message for begin, held in messages(whole).items() if begin >= chunks(whole)[2].begin for message in held]
+    assert saved(found) == sorted(everything(whole) + of(again))
 
 
 def test_a_log_that_cannot_be_written_is_named(whole, tmp_path):

@@ -7,7 +7,7 @@ import re
 import struct
 import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -30,6 +30,7 @@ from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.recover import recover_log
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.png import decode_colour, decode_gray, decode_ids, encode_gray, require_pixels, with_palette
+from semgrid_eval.recording.types import Quantity
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.sources.cityscapes.files import read_camera, read_stamp, read_vehicle
 
@@ -202,7 +203,8 @@ def log_inputs(folder: Path) -> dict[str, bytes]:
         ("two", {"frames": 2, "cameras": ("front", "rear"), "size": (8, 8)}),
         ("long", {"frames": 6, "size": (8, 8)}),
     ):
-        write_log(driving(**options), folder / f"{name}.mcap")
+        recording = replace(driving(**options), conditions={"noise": Quantity(0.31, "px"), "count": Quantity(3, "")})
+        write_log(recording, folder / f"{name}.mcap")
         made[f"{name}.mcap"] = (folder / f"{name}.mcap").read_bytes()
     return made
 
@@ -211,6 +213,7 @@ def read_log(folder: Path, name: str) -> object:
     """All that the reader gives; a check finds every damage, in lines."""
     report = check_log(folder / name)
     lines = [str(finding) for finding in report.findings]
+    json.dumps(report.to_json(), allow_nan=False)
     assert not any("\n" in line for line in lines)
     with LogReader(folder / name) as log:
         cameras = {
