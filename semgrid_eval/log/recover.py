@@ -74,6 +74,7 @@ class _Recovery:
         self._is_proved = _data_hold(stream, self._steps)
         if self._is_proved:
             self._steps = list(walk(stream, self._index, proved=True))
+        self._has_chunks = any(step.opcode == Opcode.CHUNK for step in self._steps)
         self._contents = Contents(stream, self._steps, self._index)
         self._losses: list[Loss] = []
         self._lost_files: list[str] = _lost_files(self._steps, self._index)
@@ -140,12 +141,17 @@ class _Recovery:
     def _message(self, part: Part) -> None:
         body = body_of(self._stream, part)
         message = records.Message.read(ReadDataStream(io.BytesIO(body)), len(body))
-        self._saved_times([message.log_time])
-        if self._copier.message(message):
+        held = None
+        if self._has_chunks and not self._is_proved:  # any record becomes one by a flip in its opcode
+            reason = "something that looks like a message outside chunks, in a log of chunks"
+        elif self._copier.message(message):
+            reason = ""
+            self._saved_times([message.log_time])
             self._unproved("messages outside chunks")
         else:
-            lost = lost_messages({message.channel_id: [message.log_time]}, {})
-            self._losses.append(Loss(part.begin, part.end, "the topic of a channel is lost", lost, self._last_ns))
+            reason, held = "the topic of a channel is lost", lost_messages({message.channel_id: [message.log_time]}, {})
+        if reason:
+            self._losses.append(Loss(part.begin, part.end, reason, held, self._last_ns))
 
     def _attachment(self, part: Part) -> None:
         self._copier.attachment(read_attachment(body_of(self._stream, part)))

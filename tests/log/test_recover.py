@@ -212,6 +212,14 @@ def test_messages_outside_chunks_are_kept_and_said_to_be_unproved(tmp_path, reco
     assert proved.unproved == ()
 
 
+def test_a_record_that_a_flip_makes_a_message_is_none(whole, recover):
+    index = next(each for each in stretches(whole) if each.opcode == 7)
+    damaged = whole[: index.begin] + b"\x05" + whole[index.begin + 1 : -40]
+    found = recover(damaged)
+    assert saved(found) == everything(whole)
+    assert "looks like a message outside chunks" in found.losses[0].reason
+
+
 def test_the_inside_of_an_uncompressed_chunk_whose_length_is_damaged_is_not_taken_for_records(tmp_path, recover):
     data = foreign(tmp_path / "other.mcap", compression=CompressionType.NONE)
     inner = 9 + 40  # up to the first record of a chunk
