@@ -33,6 +33,7 @@ def test_nothing_is_found_in_a_short_run(fuzz, tmp_path, name):
     assert tally.failures == []
     assert tally.outcomes.total() == COUNTS[name]
     assert tally.outcomes["refused"] > COUNTS[name] // 20
+    assert tally.outcomes["refused"] < COUNTS[name] or name in ("log", "recovery")  # some changes mean nothing
 
 
 def test_every_kind_that_a_run_keeps_is_fuzzed():
