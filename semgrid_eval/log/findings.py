@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from semgrid_eval.errors import printable
 from semgrid_eval.recording.types import Quantity
 
 MOST_FINDINGS = 100
@@ -27,7 +28,7 @@ class Finding:
     message: str
 
     def __str__(self) -> str:
-        return f"{self.severity}: {self.place}: {self.message}"
+        return printable(f"{self.severity}: {self.place}: {self.message}")
 
 
 @dataclass(frozen=True)

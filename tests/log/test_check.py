@@ -265,3 +265,10 @@ def test_a_channel_of_another_type_is_an_error(tmp_path):
     contract = Contract(topics={"/tf": TopicContract(type="geometry_msgs/Pose")})
     (found,) = check_log(tmp_path / "log.mcap", contract).findings
     assert str(found) == "error: /tf: type: holds foxglove.FrameTransforms messages; geometry_msgs/Pose is needed"
+
+
+def test_a_name_that_holds_the_end_of_a_line_is_told_in_one(tmp_path):
+    path, cameras = tmp_path / "log.mcap", {"front": CALIBRATION, "a\nb": CALIBRATION}
+    write_log(replace(driving(), moments=smooth, calibrations=cameras), path)
+    found = [finding for finding in check_log(path).findings if finding.place == "camera a\nb"]
+    assert [str(finding).partition(": cannot")[0] for finding in found] == ["error: camera a\\nb"]
