@@ -13,7 +13,11 @@ REFERENCE_COMMANDS := "$(REFERENCE_LOGS)" \
   "run $(REFERENCE_MATRIX) --logs $(REFERENCE)/logs --out $(REFERENCE)/run --jobs 2" \
   "report $(REFERENCE)/run --out $(REFERENCE_REPORT)"
 
-.PHONY: demo test check reference clean
+# Cases of each kind, and a bound for all of them together.
+FUZZ_COUNT ?= 1000
+FUZZ_SECONDS ?= 600
+
+.PHONY: demo test check fuzz licences reference clean
 
 demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo
@@ -29,6 +33,12 @@ check: $(READY)  ## lint, format and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --explicit-package-bases semgrid_eval tools/*.py
+
+fuzz: $(READY)  ## mutated logs, pictures, settings and results, of each kind FUZZ_COUNT within FUZZ_SECONDS in all
+	PYTHONPATH=.:tests $(BIN)/python tools/fuzz.py --count $(FUZZ_COUNT) --seconds $(FUZZ_SECONDS)
+
+licences: $(READY)  ## of all packages that are needed
+	$(BIN)/python tools/licences.py
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)

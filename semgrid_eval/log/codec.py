@@ -78,7 +78,7 @@ class Scene:
             ValueError: they are damaged, incomplete or of another format version.
         """
         given = {key: value for key, value in entries.items() if key != "digest"}
-        if entries.get("digest") != digest_value(given):
+        if not is_scene_whole(entries):
             raise ValueError(f"metadata {RECORD} does not match its digest")
         if given.get("format_version") != str(FORMAT_VERSION):
             raise ValueError(f"its format version is {given.get('format_version')}; {FORMAT_VERSION} can be read")
@@ -87,6 +87,12 @@ class Scene:
         words = {name: given[name] for name in ("name", "dataset", "split", "source_digest")}
         cameras, class_names = (tuple(json.loads(given[name])) for name in ("cameras", "class_names"))
         return cls(**words, cameras=cameras, class_names=class_names, group=given.get("group", ""))
+
+
+def is_scene_whole(entries: Mapping[str, str]) -> bool:
+    """Tell whether the entries of the metadata record of a scene are those that were written."""
+    given = {key: value for key, value in entries.items() if key != "digest"}
+    return entries.get("digest") == digest_value(given)
 
 
 def conditions_metadata(conditions: Mapping[str, Quantity]) -> dict[str, str]:
@@ -98,10 +104,14 @@ def read_conditions(entries: Mapping[str, str]) -> dict[str, Quantity]:
     """Read the entries of the metadata record of conditions.
 
     Raises:
-        ValueError: one does not begin with a number.
+        ValueError: one does not begin with a finite number.
     """
     parts = {name: text.partition(" ") for name, text in entries.items()}
-    return {name: Quantity(json.loads(value), unit) for name, (value, _, unit) in parts.items()}
+    found = {name: Quantity(json.loads(value), unit) for name, (value, _, unit) in parts.items()}
+    for name, each in found.items():
+        if type(each.value) not in (int, float) or not math.isfinite(each.value):
+            raise ValueError(f"its condition {name[:_SHOWN]!r} is not a number")
+    return found
 
 
 def require_file_name(text: str, what: str) -> None:

@@ -139,7 +139,7 @@ def _is_current(path: Path, digest: str) -> bool:
     """Whether the log is there, whole and made from inputs of this digest."""
     try:
         with LogReader(path) as log:
-            if log.scene.source_digest != digest:
+            if log.scene.source_digest != digest or log.recovered():  # a conversion can give all that was lost
                 return False
             log.verify()
     except LogError:

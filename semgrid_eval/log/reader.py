@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from semgrid_eval.errors import InputError, LogError
-from semgrid_eval.log import codec, topics
+from semgrid_eval.log import codec, recovered, topics
 from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene
 from semgrid_eval.log.container import Container, damage_as_log_error
+from semgrid_eval.log.recovered import Recovered
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Quantity
 
@@ -68,6 +69,11 @@ class LogReader(Container):
         with damage_as_log_error(self.path):
             return codec.read_conditions(entries)
 
+    def recovered(self) -> Recovered | None:
+        """Return what the log says of its recovery from a damaged one, None where it is no such log."""
+        entries = self.metadata(recovered.RECORD)
+        return None if entries is None else Recovered.from_metadata(entries)
+
     def choose_camera(self, wanted: str | None) -> str:
         """Return the camera that is wanted, or the log's only one where none is.
 
@@ -86,15 +92,14 @@ class LogReader(Container):
         names = {number: schema.name for number, schema in self.summary.schemas.items()}
         return {each.topic: names.get(each.schema_id, "") for each in self.summary.channels.values()}
 
-    def stamps_ns(self) -> dict[str, list[int]]:
-        """Return the times of all messages by topic, ascending; this reads the whole file."""
-        found: dict[str, list[int]] = {topic: [] for topic in self.schemas()}
-        for entry in self.messages():
-            found[entry.topic].append(entry.log_ns)
-        count = sum(len(stamps) for stamps in found.values())
+    def require_count(self, count: int) -> None:
+        """Make sure that as many messages were found as the index states.
+
+        Raises:
+            LogError: there are more or fewer.
+        """
         if count != self.message_count:
             raise LogError(f"holds {count} messages, but its index states {self.message_count}", path=self.path)
-        return found
 
     def calibration(self, camera: str) -> CameraCalibration:
         """Return the calibration of a camera."""
@@ -160,7 +165,7 @@ class LogReader(Container):
 
     def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
         """Iterate over what messages say; `decoders` maps topics to what reads their messages."""
-        for topic, stamp_ns, data in self.messages(decoders):
+        for topic, stamp_ns, data, _ in self.messages(decoders):
             with damage_as_log_error(self.path):
                 value = decoders[topic](data)
             yield Decoded(topic, stamp_ns, value)

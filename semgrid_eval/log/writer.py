@@ -19,26 +19,32 @@ from semgrid_eval.recording.png import PngHeader, read_header, require_pixels, w
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 
 CHUNK_BYTES = 1 << 20
+LIBRARY = f"semgrid-eval/{__version__}"
+
+
+def open_writer(stream: BinaryIO) -> Writer:
+    """Return a writer of chunks with all indexes and all checksums."""
+    return Writer(
+        stream,
+        chunk_size=CHUNK_BYTES,
+        compression=CompressionType.ZSTD,
+        index_types=IndexType.ALL,
+        enable_crcs=True,
+        enable_data_crcs=True,
+    )
 
 
 class MessageWriter:
     """Registers a channel at the first message of its topic; finishes the log when its block ends without error."""
 
     def __init__(self, stream: BinaryIO) -> None:
-        self._writer = Writer(
-            stream,
-            chunk_size=CHUNK_BYTES,
-            compression=CompressionType.ZSTD,
-            index_types=IndexType.ALL,
-            enable_crcs=True,
-            enable_data_crcs=True,
-        )
+        self._writer = open_writer(stream)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._counts: Counter[int] = Counter()
 
     def __enter__(self) -> Self:
-        self._writer.start(profile="", library=f"semgrid-eval/{__version__}")
+        self._writer.start(profile="", library=LIBRARY)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:

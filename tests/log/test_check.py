@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 from support.driving import CALIBRATION, FRAME_NS, driving
 
-from semgrid_eval.log.check import Severity, check_log
+from semgrid_eval.log.check import check_log
+from semgrid_eval.log.codec import image_message
+from semgrid_eval.log.contract import Contract, Range, TopicContract
+from semgrid_eval.log.findings import Severity
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.png import encode_gray
 
@@ -71,15 +74,19 @@ def test_missing_labels_and_images_are_counted(tmp_path):
         return with_frame(moment, label_png=None) if number < 3 else with_frame(moment, image_png=None)
 
     assert findings(tmp_path, change) == {
-        "/camera/front/label": (Severity.WARNING, "is missing for 3 of 8 disparity images"),
-        "/camera/front/image": (Severity.WARNING, "is missing for 5 of 8 disparity images"),
+        f"/camera/front/{channel}: missing_beside": (
+            Severity.WARNING,
+            f"is missing for {count} of 8 messages of /camera/front/disparity (allowed: at most 0)",
+        )
+        for channel, count in (("label", 3), ("image", 5))
     }
 
 
 def test_log_without_frames_or_motion_is_an_error(tmp_path):
     found = findings(tmp_path, lambda number, moment: replace(moment, cameras={}, motion=()))
-    assert found["/camera/front/disparity"] == (Severity.ERROR, "has no message")
-    assert found["/ego/motion"] == (Severity.ERROR, "has no message")
+    for topic in ("/camera/front/disparity", "/ego/motion"):
+        assert found[f"{topic}: messages"] == (Severity.ERROR, "has 0 messages (allowed: at least 1)")
+    assert "cannot be looked at without proper messages of /camera/front/disparity," in found["camera front"][1]
 
 
 def shifted(moment, by_ns):
@@ -90,24 +97,26 @@ def shifted(moment, by_ns):
 
 def test_gap_in_time_is_a_warning(tmp_path):
     found = findings(tmp_path, lambda number, moment: shifted(moment, FRAME_NS * 4 if number > 5 else 0))
-    expected = (Severity.WARNING, "has 1 gaps at a period of 0.059 s; the longest is 0.294 s")
-    assert found == {"/camera/front/disparity": expected, "/ego/motion": expected}
+    expected = (Severity.WARNING, "has a gap of 0.294 s at a period of 0.059 s (allowed: at most 1.5)")
+    assert found == {f"{topic}: gap_periods": expected for topic in ("/camera/front/disparity", "/ego/motion")}
 
 
 def test_jitter_is_a_warning(tmp_path):
     found = findings(tmp_path, lambda number, moment: shifted(moment, FRAME_NS // 5 * (number % 2)))
-    assert "vary by" in found["/camera/front/disparity"][1]
+    assert "vary by" in found["/camera/front/disparity: jitter_periods"][1]
 
 
 def test_repeated_time_is_an_error(tmp_path):
     found = findings(tmp_path, lambda number, moment: shifted(moment, -FRAME_NS if number == 5 else 0))
-    assert found["/ego/motion"] == (Severity.ERROR, "1 messages have the time of the message before")
-    assert found["/camera/front/disparity"][0] is Severity.ERROR
+    text = "has 1 messages with the time of the message before (allowed: at most 0)"
+    assert found["/ego/motion: repeated_times"] == (Severity.ERROR, text)
+    assert found["/camera/front/disparity: repeated_times"][0] is Severity.ERROR
 
 
 def test_frames_outside_the_time_of_the_motion_are_a_warning(tmp_path):
     found = findings(tmp_path, lambda number, moment: replace(moment, motion=()) if number == 7 else moment)
-    assert found == {"/ego/motion": (Severity.WARNING, "does not cover the time of all frames of camera front")}
+    text = "leaves out 0.059 s of the time of /camera/front/disparity (allowed: at most 0)"
+    assert found == {"/ego/motion: uncovered_s": (Severity.WARNING, text)}
 
 
 @pytest.mark.parametrize(
@@ -125,7 +134,7 @@ def test_impossible_motion_is_an_error(tmp_path, changes, place, severity):
 
 def test_jump_in_speed_is_a_warning(tmp_path):
     found = findings(tmp_path, lambda number, moment: with_motion(moment, speed_mps=20.0 if number == 4 else 8.0))
-    assert found["/ego/motion: speed_mps"][0] is Severity.WARNING
+    assert found["/ego/motion: acceleration_mps2"][0] is Severity.WARNING
 
 
 @pytest.mark.parametrize("speed_mps", [float("nan"), float("inf")])
@@ -139,17 +148,17 @@ def test_motion_that_is_no_number_is_an_error(tmp_path, speed_mps):
 @pytest.mark.parametrize(
     ("field", "value", "place"),
     [
-        ("fx_px", 2262.0, "fx_px / width"),
-        ("fy_px", 140.0, "fy_px / fx_px"),
-        ("v0_px", 400.0, "v0_px / height"),
-        ("baseline_m", 209.0, "baseline_m"),
-        ("z_m", -1.2, "z_m"),
-        ("pitch_rad", 2.2, "pitch_rad"),
+        ("fx_px", 2262.0, "calibration: fx_px / width"),
+        ("fy_px", 140.0, "calibration: fy_px / fx_px"),
+        ("v0_px", 400.0, "calibration: v0_px / height"),
+        ("baseline_m", 209.0, "stereo: baseline_m"),
+        ("z_m", -1.2, "stereo: z_m"),
+        ("pitch_rad", 2.2, "stereo: pitch_rad"),
     ],
 )
 def test_implausible_calibration_is_a_warning(tmp_path, field, value, place):
     found = findings(tmp_path, calibrations={"front": replace(CALIBRATION, **{field: value})})
-    assert found[f"/camera/front/calibration: {place}"][0] is Severity.WARNING
+    assert found[f"/camera/front/{place}"][0] is Severity.WARNING
 
 
 def test_pictures_of_different_size_are_an_error(tmp_path):
@@ -163,10 +172,8 @@ def test_pictures_of_different_size_are_an_error(tmp_path):
 def test_empty_disparity_is_a_warning(tmp_path):
     empty = encode_gray(np.zeros((32, 64), np.uint16))
     found = findings(tmp_path, lambda number, moment: with_frame(moment, disparity_png=empty))
-    assert found["/camera/front/disparity"] == (
-        Severity.WARNING,
-        "one frame has a disparity at only 0.0 % of its pixels",
-    )
+    expected = (Severity.WARNING, "is 0 (allowed: at least 0.02)")
+    assert found["/camera/front/disparity: valid_share"] == expected
 
 
 def with_labels(moment, highest):
@@ -174,7 +181,8 @@ def with_labels(moment, highest):
 
 
 def test_labels_that_look_like_train_ids_are_one_warning_a_log(tmp_path):
-    expected = (Severity.WARNING, "the largest is 18, so they look like train ids; convert again with --train-ids")
+    what = "the largest id is 18, so they look like train ids; convert again with --train-ids (allowed: at least 19)"
+    expected = (Severity.WARNING, what)
     assert findings(tmp_path, lambda number, moment: with_labels(moment, 18 - number)) == {"labels": expected}
 
     def two(number, moment):
@@ -192,13 +200,14 @@ def test_one_larger_label_in_a_whole_log_says_that_they_are_label_ids(tmp_path):
 
 def test_log_without_labels_is_not_said_to_hold_train_ids(tmp_path):
     found = findings(tmp_path, lambda number, moment: with_frame(moment, label_png=None))
-    assert list(found) == ["/camera/front/label"]
+    assert list(found) == ["/camera/front/label: missing_beside"]
 
 
 def test_values_that_are_no_labels_are_a_warning(tmp_path):
     train_ids = encode_gray(np.full((32, 64), 255, np.uint8))
     found = findings(tmp_path, lambda number, moment: with_frame(moment, label_png=train_ids))
-    assert "[255], which are not Cityscapes label ids" in found["/camera/front/label"][1]
+    text = "is 255; are they train ids? (allowed: 0 to 33)"
+    assert found["/camera/front/label: label_id"] == (Severity.WARNING, text)
 
 
 def test_a_damaged_attachment_is_an_error_where_no_checksum_of_all_data_tells(tmp_path):
@@ -211,3 +220,55 @@ def test_a_damaged_attachment_is_an_error_where_no_checksum_of_all_data_tells(tm
     assert [finding.message for finding in found] == [
         "is damaged: the checksum of attachment 'notes.txt' does not match"
     ]
+
+
+def test_pictures_and_motion_whose_stamps_are_not_their_times_are_errors(tmp_path, monkeypatch):
+    def late(stamp_ns, camera, png):
+        return image_message(stamp_ns - 5_000_000, camera, png)
+
+    monkeypatch.setattr("semgrid_eval.log.codec.image_message", late)
+    text = "log is up to 0.005 s after stamp in 8 of 8 messages (allowed: 0 to 0)"
+    expected = (Severity.ERROR, text)
+    assert findings(tmp_path) == {f"/camera/front/{each}: latency": expected for each in ("disparity", "label")}
+
+
+def test_what_a_contract_leaves_out_is_not_looked_at(tmp_path):
+    assert findings(tmp_path, lambda number, moment: with_motion(moment, speed_mps=90.0))
+    assert check_log(tmp_path / "log.mcap", Contract()).findings == ()
+
+
+@pytest.mark.parametrize(
+    ("topic", "name", "value"),
+    [
+        ("/ego/motion", "speed_mps", 8),
+        ("/ego/motion", "acceleration_mps2", 0),
+        ("/camera/{camera}/calibration", "fx_px", 70.5),
+        ("/camera/{camera}/calibration", "v0_px / height", 15.75 / 32),
+        ("/camera/front/stereo", "z_m", 1.22),
+        ("/camera/{camera}/disparity", "width_px", 64),
+        ("/camera/{camera}/disparity", "height_px", 32),
+    ],
+)
+def test_every_value_can_be_held_to_a_range(tmp_path, topic, name, value):
+    findings(tmp_path)
+
+    def broken(**limit):
+        contract = Contract(topics={topic: TopicContract(values={name: Range(**limit)})})
+        return [finding.place for finding in check_log(tmp_path / "log.mcap", contract).findings]
+
+    assert broken(low=value, high=value) == []
+    assert broken(low=value + 0.01) == broken(high=value - 0.01) == [f"{topic.format(camera='front')}: {name}"]
+
+
+def test_a_channel_of_another_type_is_an_error(tmp_path):
+    findings(tmp_path)
+    contract = Contract(topics={"/tf": TopicContract(type="geometry_msgs/Pose")})
+    (found,) = check_log(tmp_path / "log.mcap", contract).findings
+    assert str(found) == "error: /tf: type: holds foxglove.FrameTransforms messages; geometry_msgs/Pose is needed"
+
+
+def test_a_name_that_holds_the_end_of_a_line_is_told_in_one(tmp_path):
+    path, cameras = tmp_path / "log.mcap", {"front": CALIBRATION, "a\nb": CALIBRATION}
+    write_log(replace(driving(), moments=smooth, calibrations=cameras), path)
+    found = [finding for finding in check_log(path).findings if finding.place == "camera a\nb"]
+    assert [str(finding).partition(": cannot")[0] for finding in found] == ["error: camera a\\nb"]

@@ -61,7 +61,7 @@ def cameras(place):
 
 def test_every_log_has_a_camera_of_its_own_and_is_sound(place):
     assert len(set(cameras(place).values())) == 4
-    checked = json.loads(call("check", "--json", place / "logs").stdout)
+    checked = json.loads(call("check", "--json", place / "logs").stdout)["logs"]
     assert all(log["good"] for log in checked)
     assert [log["findings"] for log in checked] == [[]] * 4
     widths = [log["conditions"]["camera.width_px"] for log in checked]

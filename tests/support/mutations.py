@@ -1,13 +1,7 @@
-"""Changes bytes of whatever a run keeps, and counts what readers take for whole all the same.
-
-Example: PYTHONPATH=.:tests python -m support.mutations 500
-"""
+"""Changes bytes of whatever a run keeps, and counts what readers take for whole all the same."""
 
 import random
 import re
-import sys
-import tempfile
-from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -122,21 +116,3 @@ def mutate(run: Path, kind: str, count: int, chance: random.Random) -> Iterator[
             yield True
         finally:
             path.write_bytes(whole[path])
-
-
-def main() -> None:
-    """Print for each kind how many changes were made, and how many of them were accepted."""
-    count = int(sys.argv[1])
-    torch.set_num_threads(1)
-    with tempfile.TemporaryDirectory() as folder:
-        run = make_run(Path(folder))
-        total = Counter[bool]()
-        for seed, kind in enumerate(KINDS):
-            found = Counter(mutate(run, kind, count, random.Random(seed)))
-            total += found
-            sys.stdout.write(f"{kind:<12}{found.total():>7} changed {found[True]:>5} accepted\n")
-        sys.stdout.write(f"{'all':<12}{total.total():>7} changed {total[True]:>5} accepted\n")
-
-
-if __name__ == "__main__":
-    main()

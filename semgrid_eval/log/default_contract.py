@@ -1,0 +1,70 @@
+"""What is expected of any recording: the one table of limits that `check` goes by unless it is given another."""
+
+from functools import cache
+
+from semgrid_eval.classes import CITYSCAPES_LABELS
+from semgrid_eval.log import topics
+from semgrid_eval.log.contract import CAMERA, Contract, Latency, Range, RangeBeside, TopicContract
+from semgrid_eval.log.findings import Severity
+from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.motion import LIMITS
+
+_ERROR = Severity.ERROR
+_DISPARITY, _LABEL, _IMAGE, _CALIBRATION, _STEREO = (
+    camera_topic(CAMERA, each)
+    for each in (topics.DISPARITY, topics.LABEL, topics.IMAGE, topics.CALIBRATION, topics.STEREO)
+)
+_PICTURE = "foxglove.CompressedImage"
+_NEEDED = Range(low=1, severity=_ERROR)
+_WITH_DISPARITY = RangeBeside(topic=_DISPARITY, high=0)
+_STEADY = TopicContract(
+    messages=_NEEDED,
+    repeated_times=Range(high=0, severity=_ERROR),
+    gap_periods=Range(high=1.5),
+    jitter_periods=Range(high=0.2),
+)
+# What a road vehicle, and its stereo camera, can plausibly be.
+_MOTION = {
+    **{name: Range(low=low, high=high, severity=_ERROR) for name, ((low, high), _) in LIMITS.items()},
+    "acceleration_mps2": Range(low=-20, high=20),
+}
+_OPTICS = {
+    "fx_px / width": Range(low=0.2, high=5),
+    "fy_px / fx_px": Range(low=0.9, high=1.1),
+    "u0_px / width": Range(low=0.2, high=0.8),
+    "v0_px / height": Range(low=0.2, high=0.8),
+}
+_MOUNTING = {
+    "baseline_m": Range(low=0.03, high=2),
+    "z_m": Range(low=0.3, high=4),
+    "roll_rad": Range(low=-0.5, high=0.5),
+    "pitch_rad": Range(low=-0.5, high=0.5),
+}
+_LAST_LABEL_ID = max(label.label_id for label in CITYSCAPES_LABELS)
+_LAST_TRAIN_ID = max(label.train_id for label in CITYSCAPES_LABELS if label.train_id != 255)
+
+
+@cache
+def default_contract() -> Contract:
+    """Return what is expected of any recording."""
+    motion = {"type": "semgrid.v1.Egomotion", "uncovered_s": _WITH_DISPARITY, "values": _MOTION}
+    disparity = {"type": _PICTURE, "values": {"valid_share": Range(low=0.02)}}
+    ids = {"label_id": Range(low=0, high=_LAST_LABEL_ID)}
+    return Contract(
+        checksums=Severity.WARNING,
+        cameras=_NEEDED,
+        largest_label_id=Range(low=_LAST_TRAIN_ID + 1),
+        topics={
+            topics.EGO_MOTION: _STEADY.model_copy(update=motion),
+            _DISPARITY: _STEADY.model_copy(update=disparity),
+            _LABEL: TopicContract(type=_PICTURE, missing_beside=_WITH_DISPARITY, values=ids),
+            _IMAGE: TopicContract(type=_PICTURE, missing_beside=_WITH_DISPARITY),
+            _CALIBRATION: TopicContract(type="foxglove.CameraCalibration", messages=_NEEDED, values=_OPTICS),
+            _STEREO: TopicContract(type="semgrid.v1.StereoCalibration", messages=_NEEDED, values=_MOUNTING),
+        },
+        # Motion is placed at its stamp, pictures at their log time: they must agree.
+        latencies=tuple(
+            Latency(topic=topic, seconds=Range(low=0, high=0, severity=_ERROR))
+            for topic in (topics.EGO_MOTION, _DISPARITY, _LABEL)
+        ),
+    )

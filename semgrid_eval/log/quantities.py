@@ -1,0 +1,125 @@
+"""What the messages of a log measure, by topic and name: of motion, calibration and pictures."""
+
+import re
+from collections.abc import Generator, Iterable, Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.log import topics
+from semgrid_eval.log.findings import Finding, error
+from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.motion import MotionSample
+from semgrid_eval.recording.png import decode_gray, read_header
+from semgrid_eval.recording.types import CameraCalibration, CameraFrame
+
+_NS_PER_S = 1e9
+_CAMERA_TOPIC = re.compile(r"/camera/[^/]+/(.+)")
+_MOTION = ("speed_mps", "yaw_rate_radps", "latitude_deg", "longitude_deg", "heading_deg")
+_MOUNTING = ("baseline_m", "x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad")
+_OPTICS = ("fx_px / width", "fy_px / fx_px", "u0_px / width", "v0_px / height", "fx_px", "fy_px", "u0_px", "v0_px")
+_OF_CHANNELS = {
+    topics.CALIBRATION: _OPTICS,
+    topics.STEREO: _MOUNTING,
+    topics.DISPARITY: ("valid_share", "width_px", "height_px"),
+    topics.LABEL: ("label_id",),
+}
+
+
+def quantities_of(topic: str) -> tuple[str, ...]:
+    """Name what the messages of a topic measure.
+
+    `valid_share` is the part of a disparity image's pixels that have a disparity, `acceleration_mps2` the change of
+    the speed from one message to the next; the others are what messages say, or ratios of that.
+    """
+    if topic == topics.EGO_MOTION:
+        return (*_MOTION, "acceleration_mps2")
+    found = _CAMERA_TOPIC.fullmatch(topic)
+    return _OF_CHANNELS.get(found[1], ()) if found else ()
+
+
+class Extent(NamedTuple):
+    """The smallest and the largest of some values."""
+
+    low: float
+    high: float
+
+
+Extents = dict[str, dict[str, Extent]]
+"""By topic and name."""
+
+
+def motion_extents(samples: Iterable[MotionSample]) -> Extents:
+    """Return what the motion measures."""
+    given = list(samples)
+    values = {name: [value for each in given if (value := getattr(each, name)) is not None] for name in _MOTION}
+    values["acceleration_mps2"] = [
+        (after.speed_mps - before.speed_mps) * _NS_PER_S / (after.stamp_ns - before.stamp_ns)
+        for before, after in pairwise(given)
+        if after.stamp_ns > before.stamp_ns
+    ]
+    return {topics.EGO_MOTION: {name: Extent(min(each), max(each)) for name, each in values.items() if each}}
+
+
+def camera_extents(log: LogReader, camera: str) -> Generator[Finding, None, Extents]:
+    """Decode every label and disparity image of a camera and return what they and its calibration measure.
+
+    An image that cannot be decoded, or has another size than those before, is an error, and what follows is left out.
+    """
+    size: tuple[int, int] | None = None
+    found: Extents = {}
+    for frame in log.frames(camera, images=True):
+        try:
+            size = _require_size(frame, size)
+            for channel, name, extent in _frame_values(frame):
+                _widen(found.setdefault(camera_topic(camera, channel), {}), name, extent)
+        except InputError as fault:
+            yield error(f"camera {camera}", f"picture at {frame.stamp_ns} ns: {fault}")
+            return found
+    if size is not None:
+        calibration = log.calibration(camera)
+        found[camera_topic(camera, topics.CALIBRATION)] = _optics(calibration, size)
+        found[camera_topic(camera, topics.STEREO)] = {name: _one(getattr(calibration, name)) for name in _MOUNTING}
+        sizes = zip(("width_px", "height_px"), map(_one, size), strict=True)
+        found[camera_topic(camera, topics.DISPARITY)].update(sizes)
+    return found
+
+
+def _frame_values(frame: CameraFrame) -> Iterator[tuple[str, str, Extent]]:
+    share = float((decode_gray(frame.disparity_png, bit_depth=16) > 0).mean())
+    yield topics.DISPARITY, "valid_share", _one(share)
+    if frame.label_png is not None:
+        ids = decode_gray(frame.label_png, bit_depth=8)
+        yield topics.LABEL, "label_id", Extent(int(np.min(ids)), int(np.max(ids)))
+
+
+def _require_size(frame: CameraFrame, size: tuple[int, int] | None) -> tuple[int, int]:
+    """Return the size (width, height) of all pictures of a frame, that of the frames before if there were any."""
+    for channel, png in (("disparity", frame.disparity_png), ("label", frame.label_png), ("image", frame.image_png)):
+        if png is None:
+            continue
+        header = read_header(png)
+        size = size or (header.width, header.height)
+        if header[:2] != size:
+            raise InputError(f"is {header.width} x {header.height}, not {size[0]} x {size[1]}", field=channel)
+    assert size is not None
+    return size
+
+
+def _optics(calibration: CameraCalibration, size: tuple[int, int]) -> dict[str, Extent]:
+    """Return intrinsics for pictures of a size (width, height), as numbers of pixels and as ratios."""
+    fx, fy, u0, v0 = calibration.fx_px, calibration.fy_px, calibration.u0_px, calibration.v0_px
+    values = (fx / size[0], fy / fx, u0 / size[0], v0 / size[1], fx, fy, u0, v0)
+    return {name: _one(value) for name, value in zip(_OPTICS, values, strict=True)}
+
+
+def _one(value: float) -> Extent:
+    return Extent(value, value)
+
+
+def _widen(extents: dict[str, Extent], name: str, extent: Extent) -> None:
+    known = extents.get(name, extent)
+    extents[name] = Extent(min(known.low, extent.low), max(known.high, extent.high))
