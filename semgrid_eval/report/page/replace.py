@@ -12,7 +12,7 @@ from semgrid_eval.files import read_json
 from semgrid_eval.report.page.exports import FILES, PAGE, RECORD
 
 _NUMBERS = "summary|expected|scores|findings|streams|calibration|settings|training|timings|windows"
-_TOP = re.compile(rf"index\.html|report\.json|matrix(-\d+)?\.yaml|({_NUMBERS})\.csv|summary\.(md|tex)")
+_TOP = re.compile(rf"index\.html|report\.json|matrix(-\d+)?\.yaml|leads\.json|({_NUMBERS})\.csv|summary\.(md|tex)")
 """Names beside the page that a report may have now."""
 _EARLIER = re.compile(
     r"(architecture|categories|classes|paces|regions|where)\.csv|figures/[^/]+\.(png|svg)|tables/[^/]+\.(csv|json|md|tex)"
