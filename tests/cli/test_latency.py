@@ -38,6 +38,17 @@ def test_random_weights_are_said(logs):
     assert "ed has random weights: it takes as long as if it were trained" in done.stderr
 
 
+def test_processor_time_is_counted_on_one_thread_alone_and_said(logs, capsys):
+    arguments = ["latency", "logs", "--processor-time", "--frames", "2", "--warm-up", "0", "--out", "profile.json"]
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert capsys.readouterr().err.startswith("Error: processor_time: is what a chain takes on one thread of a CPU")
+    done = CliRunner().invoke(cli, [*arguments, "--threads", "1"])
+    assert done.exit_code == 0, done.output
+    assert read_profile(logs / "profile.json").made_by.machine["clock"] == "processor time"
+    assert "clock processor time" in done.stdout
+
+
 def test_a_table_shows_stages_models_and_chains_with_their_shares():
     made_by = {"command": "", "version": "1", "machine": {}}
     stages = {"align": (1.0, 1.0), "decode": (2.0, 4.0)}
