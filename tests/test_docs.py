@@ -21,6 +21,7 @@ from semgrid_eval.windows.data import WindowBatch
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 EXPERIMENTS = [(ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("remedies", "disturbances")]
+LATENCY = (ROOT / "docs" / "latency.md").read_text(encoding="utf-8")
 
 
 def blocks(language, page=README):
@@ -28,7 +29,7 @@ def blocks(language, page=README):
 
 
 def commands():
-    shown = [block for page in (README, *EXPERIMENTS) for block in blocks("sh", page)]
+    shown = [block for page in (README, *EXPERIMENTS, LATENCY) for block in blocks("sh", page)]
     lines = [line.partition("#")[0].strip() for block in shown for line in block.splitlines()]
     return list(dict.fromkeys(line for line in lines if line.startswith("semgrid-eval ")))
 
@@ -112,7 +113,8 @@ def test_python_of_the_readme_runs(tmp_path, monkeypatch):
     [
         *("README.md", "ARCHITECTURE.md", "reports/README.md"),
         *("docs/performance.md", "docs/readings.md", "docs/town.md", "docs/remedies.md", "docs/disturbances.md"),
-        *("docs/ceiling.md", "docs/network.md", "docs/model-card.md", "docs/check.md"),
+        *("docs/ceiling.md", "docs/network.md", "docs/model-card.md", "docs/check.md", "docs/latency.md"),
+        "docs/streaming.md",
     ],
 )
 def test_links_and_files_that_a_page_names_exist(page):
@@ -141,3 +143,11 @@ def test_presets_named_in_the_readme_exist():
 def test_yaml_blocks_are_yaml():
     for block in blocks("yaml"):
         assert yaml.safe_load(block)
+
+
+def test_the_profile_that_the_page_on_latency_shows_is_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("profile.json").write_text(blocks("json", LATENCY)[0])
+    shown = {}
+    exec(blocks("python", LATENCY)[0], shown)
+    assert shown["profile"].chain_ms("residual-town").tolist() == pytest.approx([38.4, 53.7])

@@ -19,7 +19,8 @@ _ONNX = click.Path(path_type=Path, exists=True, dir_okay=False)
 _MODEL = "One of `run`'s models, or path.py:Class; may be given several times."
 _SEGMENT = "ONNX file of a segmentation network that makes the labels; the next options are its own."
 _RIGHT = "Folder of right images, FOLDER/<recording>/*.png in the order of frames; disparity is matched then."
-_SHOWN = ("processor", "cores", "threads", "device", "gpu")
+_PROCESSOR = "Count processor time, on one thread of a CPU: what the chain takes where nothing else runs."
+_SHOWN = ("processor", "cores", "threads", "device", "gpu", "clock")
 
 
 @click.command(
@@ -35,6 +36,7 @@ _SHOWN = ("processor", "cores", "threads", "device", "gpu")
             ["--warm-up"], type=click.IntRange(0), default=20, show_default=True, help="Frames before those that count."
         ),
         click.Option(["--threads"], type=click.IntRange(1, 1024), help="Of networks and matching.  [default: theirs]"),
+        click.Option(["--processor-time"], is_flag=True, help=_PROCESSOR),
         click.Option(["--out"], required=True, type=_FILE, help="File of the profile."),
     ],
     epilog="Example: semgrid-eval latency logs/val --model fuse --frames 100 --out profile.json",
@@ -56,8 +58,8 @@ def command(logs: tuple[Path, ...], out: Path, frames: int, warm_up: int, **give
     paths = [path for each in logs for path in (find_logs(each) if each.is_dir() else [each])]
     built = build_chain(paths, parts)
     with progress("measure") as watch:
-        measured = measure_chain(paths, built.chain, Amount(frames, warm_up), progress=watch)
-    profile = profile_of(measured, built.chain.device, command_line())
+        measured = measure_chain(paths, built.chain, Amount(frames, warm_up), clock=parts.clock, progress=watch)
+    profile = profile_of(measured, built.chain.device, command_line(), processor_time=parts.processor_time)
     write_profile(out, profile)
     machine = profile.made_by.machine
     click.echo(", ".join(f"{name} {machine[name]}" for name in _SHOWN if name in machine))

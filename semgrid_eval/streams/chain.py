@@ -12,7 +12,7 @@ import cv2
 import torch
 
 import semgrid_eval
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.models.device import choose_device, cpu_facts, settle_process
@@ -45,6 +45,12 @@ class Parts:
     right: Path | None = None  # folder of right images, as `RightImages` says
     device: str = "auto"  # of grids and models
     threads: int | None = None  # of torch, OpenCV and ONNX Runtime; None leaves them what they are
+    processor_time: bool = False  # whether that is counted, which other work on the machine does not change
+
+    @property
+    def clock(self) -> Clock:
+        """The clock that times are taken from."""
+        return time.process_time_ns if self.processor_time else time.perf_counter_ns
 
 
 @dataclass(frozen=True)
@@ -67,6 +73,8 @@ def build_chain(logs: Sequence[Path], parts: Parts) -> Built:
         torch.set_num_threads(parts.threads)
         cv2.setNumThreads(parts.threads)
     device = choose_device(parts.device)
+    if parts.processor_time and (device.type != "cpu" or parts.threads != 1):
+        raise ConfigError("is what a chain takes on one thread of a CPU alone: add threads 1", field="processor_time")
     made = models_for(parts.models, logs[0], device)
     segmentation = None
     if parts.segment is not None:
@@ -127,9 +135,12 @@ def _laps(log: LogReader, chain: Chain, clock: Clock) -> Iterator[Laps]:
             yield laps
 
 
-def profile_of(measured: Measured, device: torch.device, command: str) -> LatencyProfile:
-    """Return what was measured as a profile that says where."""
-    made_by = MadeBy(command=command, version=semgrid_eval.__version__, machine=machine(device))
+def profile_of(
+    measured: Measured, device: torch.device, command: str, *, processor_time: bool = False
+) -> LatencyProfile:
+    """Return what was measured as a profile that says where, and by which clock."""
+    here = machine(device) | ({"clock": "processor time"} if processor_time else {})
+    made_by = MadeBy(command=command, version=semgrid_eval.__version__, machine=here)
     stages, models = (
         {name: tuple(samples) for name, samples in each.items()} for each in (measured.stages, measured.models)
     )

@@ -1,6 +1,8 @@
 import shlex
 
+import cv2
 import pytest
+import torch
 from click.testing import CliRunner
 from support.toy_world import street
 
@@ -8,6 +10,14 @@ from semgrid_eval.cli import latency
 from semgrid_eval.cli.main import cli, main
 from semgrid_eval.log.store import write_log
 from semgrid_eval.streams.profile import LatencyProfile, read_profile
+
+
+@pytest.fixture(autouse=True)
+def same_threads_after():
+    of_torch, of_opencv = torch.get_num_threads(), cv2.getNumThreads()
+    yield
+    torch.set_num_threads(of_torch)
+    cv2.setNumThreads(of_opencv)
 
 
 @pytest.fixture
@@ -36,6 +46,17 @@ def test_random_weights_are_said(logs):
     done = CliRunner().invoke(cli, arguments)
     assert done.exit_code == 0, done.output
     assert "ed has random weights: it takes as long as if it were trained" in done.stderr
+
+
+def test_processor_time_is_counted_on_one_thread_alone_and_said(logs, capsys):
+    arguments = ["latency", "logs", "--processor-time", "--frames", "2", "--warm-up", "0", "--out", "profile.json"]
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert capsys.readouterr().err.startswith("Error: processor_time: is what a chain takes on one thread of a CPU")
+    done = CliRunner().invoke(cli, [*arguments, "--threads", "1"])
+    assert done.exit_code == 0, done.output
+    assert read_profile(logs / "profile.json").made_by.machine["clock"] == "processor time"
+    assert "clock processor time" in done.stdout
 
 
 def test_a_table_shows_stages_models_and_chains_with_their_shares():

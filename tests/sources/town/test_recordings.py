@@ -210,7 +210,7 @@ def test_another_seed_gives_another_town(plans):
 
 
 def test_more_windows_than_the_traffic_holds_are_refused_with_what_to_do():
-    with pytest.raises(InputError, match=r"holds only \d+ of 99999 windows; ask for fewer"):
+    with pytest.raises(InputError, match=r"holds only \d+ of 99999 windows of 30 frames; ask for fewer"):
         small_plans(recordings=100_000, val_share=1e-5)
 
 
