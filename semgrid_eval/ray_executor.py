@@ -1,5 +1,6 @@
 """Ray as an executor: the same units of work on the machines of a cluster, results written to shared storage."""
 
+import atexit
 import importlib
 import logging
 import os
@@ -95,6 +96,7 @@ class RayExecutor:
     def close(self) -> None:
         """Leave the cluster, and stop it if it was started here."""
         self._ray.shutdown()
+        atexit.unregister(self.close)
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
             self._folder = None
@@ -109,6 +111,7 @@ class RayExecutor:
 
     def _start(self, cpus: int | None) -> None:
         """Start a cluster that nobody else can reach: not from other machines, and not as another user of this one."""
+        atexit.register(self.close)
         self._folder = Path(tempfile.mkdtemp(prefix="semgrid-ray-"))  # Ray lets everybody write into those below it
         self._initialise(LOCAL, num_cpus=cpus, _node_ip_address=_LOOPBACK, _temp_dir=str(self._folder / "ray"))
         address = str(self._ray.get_runtime_context().gcs_address)
