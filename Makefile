@@ -43,7 +43,7 @@ test-lowest: $(READY)  ## the quick tests with the lowest versions of all requir
 	  pytest hypothesis pytest-xdist onnx scipy scikit-learn \
 	  "torch==$$($(BIN)/python -c 'import torch; print(torch.__version__)')"
 	build/lowest/bin/python -m pip install --quiet --no-deps --editable .
-	build/lowest/bin/python -m pytest -n auto --dist loadfile $(QUICK)
+	build/lowest/bin/python -m pytest -W ignore::DeprecationWarning -n auto --dist loadfile $(QUICK)
 
 test-pythons: $(READY)  ## what needs no torch, with every other Python from 3.11 to 3.13 that is found here
 	for python in $$($(BIN)/python tools/other_pythons.py); do \
