@@ -46,7 +46,8 @@ KEPT = (
     "report/scores.csv",
     "report/tables/*",
 )
-_PRELOADED = ("convert", "run", "report")
+_TIMES = "costs"  # the name of the tables of what a run cost
+_COMMANDS = ("convert", "run", "report")
 _LONGEST_S = 600.0  # an attempt that takes longer hangs
 _MOST_KILLS = 8  # of one cycle
 
@@ -86,7 +87,7 @@ class Soak:
             "report": ["report", run, "--out", str(folder / "report")],
         }
 
-    def start(self, folder: Path, names: Sequence[str] = _PRELOADED, before: Callable[[], None] | None = None) -> int:
+    def start(self, folder: Path, names: Sequence[str] = _COMMANDS, before: Callable[[], None] | None = None) -> int:
         """Start commands of a cycle in a process, after `before` there, and return its number."""
         folder.mkdir(parents=True, exist_ok=True)
         pid = os.fork()
@@ -106,7 +107,7 @@ class Soak:
         commands = self.commands(folder)
         return next((code for code in (call(commands[name]) for name in names) if code), 0)
 
-    def finish(self, folder: Path, names: Sequence[str] = _PRELOADED) -> None:
+    def finish(self, folder: Path, names: Sequence[str] = _COMMANDS) -> None:
         """Run undisturbed to the end, and compare."""
         code = wait(self.start(folder, names))
         if code:
@@ -166,7 +167,7 @@ def wait(pid: int) -> int:
 
 def digests(folder: Path) -> dict[str, str]:
     """Digest what has to be the same bytes, by path."""
-    files = [path for pattern in KEPT for path in folder.glob(pattern) if path.is_file()]
+    files = [path for pattern in KEPT for path in folder.glob(pattern) if path.is_file() and path.stem != _TIMES]
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
@@ -211,7 +212,7 @@ def copy_before(soak: Soak, folder: Path, name: str) -> None:
 
 def kill_at_every_rename(soak: Soak) -> None:
     """Kill each command before each of its renames, and run it again."""
-    for name in _PRELOADED:
+    for name in _COMMANDS:
         total = renames_of(soak, name)
         say(f"{name}: {total} renames")
         for number in range(1, total + 1):
@@ -226,7 +227,7 @@ def kill_at_every_rename(soak: Soak) -> None:
             if code != -signal.SIGKILL:
                 soak.fault(folder, f"was to be killed, and has exit code {code}")
             soak.done["killed at a rename"] += 1
-            soak.finish(folder, _PRELOADED[_PRELOADED.index(name) :] if name == "report" else [name])
+            soak.finish(folder, _COMMANDS[_COMMANDS.index(name) :] if name == "report" else [name])
             compare_part(soak, folder)
 
 

@@ -10,9 +10,10 @@ from pathlib import Path
 from semgrid_eval.apart import Limits
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.beside import Code, ModelFile, require_python
+from semgrid_eval.models.host import end_guests, known_answers, learn_answers
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.own import guarded, one_line
-from semgrid_eval.models.stand_in import StandIn, end_guests, known_answers, learn_answers, stand_in
+from semgrid_eval.models.stand_in import StandIn, stand_in
 
 ENTRY_POINT_GROUP = "semgrid_eval.models"
 _HERE = "semgrid_eval.models"

@@ -139,9 +139,9 @@ def test_whatever_ends_a_process_apart_is_the_reason_of_its_row_alone(logs, tmp_
 
 def test_what_hangs_is_ended_after_the_limit_and_the_rest_goes_on(logs, tmp_path):
     rows = rows_of(tmp_path, RUDE, "Hangs")
-    with own_models(Limits(time_s=15)):
+    with own_models(Limits(time_s=10)):
         record = run(rows, logs, tmp_path / "run")
-    assert record.rows[0].failure == f"{rows[0]['model']}: gave no sign for 15 s and was ended (--time-limit)"
+    assert record.rows[0].failure == f"{rows[0]['model']}: gave no sign for 10 s and was ended (--time-limit)"
     assert record.rows[1].failure is None
 
 
