@@ -158,11 +158,15 @@ def test_ray_gives_the_same_bytes_as_this_process(tmp_path):
 
     for i, split in enumerate(("train", "val")):
         write_log(street(i, frames=9).recording(f"toy{i}", split), tmp_path / "logs" / f"toy{i}.mcap")
+    (tmp_path / "own.py").write_text(
+        "from semgrid_eval.models.overlay import FuseAll\nclass Own(FuseAll):\n    baseline = False\n"
+    )
     (tmp_path / "m.yaml").write_text(
         "defaults: {window: {step_frames: 3, target_frame: 8}}\n"
         "models: {ed: {features: 4, depth: 2,\n"
         "  training: {epochs: 1, updates_per_epoch: 2, batch: 2, precision: float32}}}\n"
         "rows:\n- {name: BL-DC, model: newest}\n- {name: ED-DC, model: ed}\n"
+        f"- {{name: own, model: '{tmp_path}/own.py:Own'}}\n"
     )
     matrix = load_matrix(str(tmp_path / "m.yaml"))
     counts = {}
@@ -170,7 +174,7 @@ def test_ray_gives_the_same_bytes_as_this_process(tmp_path):
     for name, rows_on in (("here", InProcess()), ("ray", executor)):
         options = RunOptions("cpu", tmp_path / "grids", "test", executor=rows_on)
         record = run_matrix(matrix, tmp_path / "logs", tmp_path / name, options)
-        assert [row.failure for row in record.rows] == [None, None]
+        assert [row.failure for row in record.rows] == [None] * 3
         counts[name] = [
             results.read_sums(results.result_folder(tmp_path / name, r.results[0]), "iou", "all")[:, 0]
             for r in record.rows
