@@ -1,5 +1,6 @@
 """Asks models of one's own, each in a process apart that is started when needed, and knows what they have said."""
 
+import atexit
 import json
 import logging
 from collections.abc import Callable
@@ -65,6 +66,7 @@ class Host:
 
     def end(self) -> None:
         """End the process, if there is one."""
+        atexit.unregister(self.end)
         if self._guest is not None:
             self._guest.close()
             self._guest = None
@@ -80,6 +82,7 @@ class Host:
             others = [host for host in _hosts.values() if host is not self and host.is_running]
             for other in others[: len(others) - _MOST_GUESTS + 1]:
                 other.end()
+            atexit.register(self.end)
             self._guest = Apart(_GUEST, self.limits)
         return self._guest
 
