@@ -17,7 +17,14 @@ REFERENCE_COMMANDS := "$(REFERENCE_LOGS)" \
 FUZZ_COUNT ?= 1000
 FUZZ_SECONDS ?= 600
 
-.PHONY: demo test check fuzz licences reference clean
+# Tests that are quick and need neither a browser, a simulation nor a cluster; the last ones need no torch either.
+QUICK := tests/recording tests/log tests/grids tests/sensors tests/windows tests/models tests/scores tests/segmentation \
+  tests/runs/test_runner.py tests/runs/test_matrix.py tests/report/tables tests/report/estimates tests/report/rows \
+  tests/test_api.py tests/test_arrays.py tests/test_config.py tests/test_files.py tests/test_seals.py
+WITHOUT_TORCH := tests/recording tests/log tests/test_config.py tests/test_files.py tests/test_geometry.py tests/test_motion.py
+SOAK ?= build/soak
+
+.PHONY: demo test check reference fuzz licences soak test-lowest test-pythons clean
 
 demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo
@@ -28,6 +35,28 @@ reference: $(READY)  ## the paper's table on the simulated town: 15 trainings, t
 
 test: $(READY)  ## the whole suite
 	$(BIN)/python -m pytest -n auto --dist loadfile
+
+soak: $(READY)  ## kills, stops, full disks and two processes in one folder: the same bytes in the end; some ten minutes
+	rm -rf $(SOAK)
+	OMP_NUM_THREADS=1 $(BIN)/python tools/soak.py $(SOAK)
+
+test-lowest: $(READY)  ## the quick tests with the lowest versions of all requirements, but for torch
+	rm -rf build/lowest && $(PYTHON) -m venv build/lowest
+	$(BIN)/python tools/lowest_bounds.py synthetic segment > build/lowest/requirements.txt
+	build/lowest/bin/python -m pip install --quiet --requirement build/lowest/requirements.txt \
+	  pytest hypothesis pytest-xdist onnx scipy scikit-learn \
+	  "torch==$$($(BIN)/python -c 'import torch; print(torch.__version__)')"
+	build/lowest/bin/python -m pip install --quiet --no-deps --editable .
+	build/lowest/bin/python -m pytest -W ignore::DeprecationWarning -n auto --dist loadfile $(QUICK)
+
+test-pythons: $(READY)  ## what needs no torch, with every other Python from 3.11 to 3.13 that is found here
+	for python in $$($(BIN)/python tools/other_pythons.py); do \
+	  rm -rf build/python && $$python -m venv build/python \
+	  && $(BIN)/python tools/lowest_bounds.py --usual synthetic > build/python/requirements.txt \
+	  && build/python/bin/python -m pip install --quiet --requirement build/python/requirements.txt pytest hypothesis scipy \
+	  && build/python/bin/python -m pip install --quiet --no-deps --editable . \
+	  && build/python/bin/python --version && build/python/bin/python -m pytest $(WITHOUT_TORCH) || exit 1; \
+	done
 
 check: $(READY)  ## lint, format and types
 	$(BIN)/ruff check .

@@ -18,10 +18,11 @@ from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.log import store
 from semgrid_eval.log.convert import ConversionSummary, Work
 from semgrid_eval.log.reader import LogReader
+from semgrid_eval.models import registry
 from semgrid_eval.models.device import choose_device, settle_process
+from semgrid_eval.models.memory import guest_limits
 from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.network import Network, seeded_network
-from semgrid_eval.models.registry import find_model
 from semgrid_eval.models.training import train
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
@@ -157,10 +158,12 @@ def make_model(
 ) -> Model:
     """Make a model for windows of this kind: a name like `fuse` or `ed`, `path.py:Class`, or a class.
 
+    Code of one's own runs in this process here and in `fit`, as the caller's does; `run` has it in a process apart.
+
     Raises:
         InputError: there is no such model, or the settings are not its own.
     """
-    made = find_model(model) if isinstance(model, str) else model
+    made = registry.find_model(model) if isinstance(model, str) else model
     rows, columns = windows.data.grids.shape[-2:]
     given = Given(windows.sensors, windows.inputs.shape[1], rows, columns, windows.data.cell_m, windows.translate)
     chosen = made.parse_settings(dict(settings or {}), path="settings")
@@ -214,6 +217,9 @@ def run(
     only: Sequence[str] = (),
     models: Sequence[str] = (),
     validation_logs: Path | str | None = None,
+    own_models: Literal["apart", "here"] = "apart",
+    time_limit_s: float = 3600.0,
+    memory_limit_gib: float | None = None,
 ) -> RunRecord:
     """Train and score every row of a matrix file or preset; what is done already is kept.
 
@@ -226,6 +232,9 @@ def run(
         only: names or patterns of rows, like `BL-*`; all if not given.
         models: one more row for each, like `mine.py:Mine`.
         validation_logs: folder of the logs to score, where they are not in `logs`.
+        own_models: whether models of one's own run in processes apart or in this one, where a debugger can follow.
+        time_limit_s: how long code of one's own, apart, may go without a sign: an update, a batch, the end of `fit`.
+        memory_limit_gib: what it may use there, seven eighths of the machine's memory if not given.
 
     Raises:
         InputError: there is no log at all, or the device does not exist.
@@ -237,7 +246,9 @@ def run(
     options = RunOptions(
         device, folder / "grids", "semgrid_eval.run", tuple(only), executor, executor, validation_logs=scored
     )
-    return run_matrix(load_matrix(str(matrix), models=models), Path(logs), folder, options)
+    limits = guest_limits(time_limit_s, memory_limit_gib) if own_models == "apart" else None
+    with registry.own_models(limits):
+        return run_matrix(load_matrix(str(matrix), models=models), Path(logs), folder, options)
 
 
 def load_run(

@@ -1,9 +1,14 @@
 """Ray as an executor: the same units of work on the machines of a cluster, results written to shared storage."""
 
+import atexit
 import importlib
 import logging
 import os
+import secrets
+import shutil
 import socket
+import sys
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -17,6 +22,11 @@ R = TypeVar("R")
 
 LOCAL = "local"
 CONNECTION_TIMEOUT_S = 5.0
+_LOOPBACK = "127.0.0.1"
+# Ray reads these when it is imported. Where the first is off, addresses of this machine stay on its loopback interface;
+# whoever connects has to know the token, which is passed on by the environment alone.
+_KEPT_HERE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
+_TOKEN = "RAY_AUTH_TOKEN"
 
 # Ray's errors where a worker, its machine or the result there is gone; the last is the base of several.
 _LOST = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError", "ObjectLostError")
@@ -24,6 +34,9 @@ _LOST = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "Node
 
 class RayExecutor:
     """Works on a Ray cluster; the folders of logs, grids and the run must be reachable from all its machines.
+
+    One that is started here listens on the loopback interface alone, asks for a token that this process has drawn, and
+    keeps its files in a folder of this user.
 
     Args:
         address: of a running cluster (`auto` finds the one of this machine), or `local` to start one here.
@@ -33,19 +46,23 @@ class RayExecutor:
 
     Raises:
         MissingExtraError: Ray is not installed.
-        InputError: the cluster cannot be reached, or never has what a piece of work asks for.
+        InputError: the cluster cannot be reached, never has what a piece of work asks for, or listens to others when it
+            is started here.
     """
 
     def __init__(
         self, address: str = LOCAL, *, cpus: float = 1.0, gpus: float = 0.0, local_cpus: int | None = None
     ) -> None:
+        self._folder: Path | None = None  # of a cluster that is started here
+        self._cpus, self._gpus = cpus, gpus
+        if address == LOCAL:
+            _keep_to_this_machine()
         try:
             self._ray: Any = importlib.import_module("ray")  # an extra, and untyped
         except ImportError:
             raise MissingExtraError("ray", "ray") from None
-        self._cpus, self._gpus = cpus, gpus
         if not self._ray.is_initialized():
-            self._connect(address, local_cpus)
+            self._start(local_cpus) if address == LOCAL else self._connect(address)
         resources = self._ray.cluster_resources()
         for name, needed in (("CPU", cpus), ("GPU", gpus)):
             if needed > resources.get(name, 0.0):
@@ -79,6 +96,10 @@ class RayExecutor:
     def close(self) -> None:
         """Leave the cluster, and stop it if it was started here."""
         self._ray.shutdown()
+        atexit.unregister(self.close)
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder = None
 
     def _result(self, reference: Any) -> Any:  # noqa: ANN401 - Ray is untyped
         try:
@@ -88,13 +109,38 @@ class RayExecutor:
         except tuple(getattr(self._ray.exceptions, name) for name in _LOST) as error:
             return WorkerDied(first_line(error))
 
-    def _connect(self, address: str, local_cpus: int | None) -> None:
-        options: dict[str, Any] = {"num_cpus": local_cpus} if address == LOCAL else {"address": address}
+    def _start(self, cpus: int | None) -> None:
+        """Start a cluster that nobody else can reach: not from other machines, and not as another user of this one."""
+        atexit.register(self.close)
+        self._folder = Path(tempfile.mkdtemp(prefix="semgrid-ray-"))  # Ray lets everybody write into those below it
+        self._initialise(LOCAL, num_cpus=cpus, _node_ip_address=_LOOPBACK, _temp_dir=str(self._folder / "ray"))
+        address = str(self._ray.get_runtime_context().gcs_address)
+        if not address.startswith(f"{_LOOPBACK}:"):
+            self.close()
+            fault = (
+                f"this version of Ray listens on {address}, which other machines may reach; start a cluster yourself"
+            )
+            raise InputError(f"{fault} and give its --address", field="ray")
+
+    def _connect(self, address: str) -> None:
         _check_reachable(address)
+        self._initialise(address, address=address)
+
+    def _initialise(self, name: str, **options: Any) -> None:  # noqa: ANN401 - Ray is untyped
         try:
             self._ray.init(**options, include_dashboard=False, log_to_driver=False, logging_level=logging.ERROR)
-        except (ConnectionError, RuntimeError, ValueError) as error:
-            raise InputError(f"cannot be reached: {error}", field=f"ray {address}") from error
+        except (ConnectionError, RuntimeError, ValueError, OSError) as error:
+            self.close()
+            raise InputError(f"cannot be reached: {first_line(error)}", field=f"ray {name}") from error
+
+
+def _keep_to_this_machine() -> None:
+    """Set, before Ray is imported, what keeps others out of a cluster that is started here."""
+    if "ray" in sys.modules and any(os.environ.get(name) != value for name, value in _KEPT_HERE.items()):
+        settings = " ".join(f"{name}={value}" for name, value in _KEPT_HERE.items())
+        raise InputError(f"was imported before it was told to listen to this machine alone ({settings})", field="ray")
+    os.environ.update(_KEPT_HERE)
+    os.environ.setdefault(_TOKEN, secrets.token_hex(32))
 
 
 def _apply(function: Callable[[T], R], item: T, folder: str) -> R:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
 import click
 from pydantic.fields import FieldInfo
 
+from semgrid_eval.apart import Limits
 from semgrid_eval.config import Config
 from semgrid_eval.executors import Executor, available_cores, local_executor
 from semgrid_eval.ray_executor import LOCAL, RayExecutor
@@ -72,6 +73,31 @@ def executor_options(command: Command) -> Command:
     )
     executor = click.option("--executor", type=click.Choice([LOCAL, "ray"]), default=LOCAL, show_default=True)
     return executor(address(command))
+
+
+def own_model_options(command: Command) -> Command:
+    """Add the options that say where models of one's own run, and what they may use."""
+    apart = click.option(
+        "--own-models",
+        type=click.Choice(["apart", "here"]),
+        default="apart",
+        show_default=True,
+        help="Run code of your own in a process apart, or in the run's own, where a debugger can follow it.",
+    )
+    time = click.option(
+        "--time-limit",
+        type=click.FloatRange(0, min_open=True),
+        default=Limits.time_s,
+        show_default=True,
+        help="Seconds in which code of your own, apart, has to give a sign: an update, a batch, the end of its `fit`.",
+    )
+    memory = click.option(
+        "--memory-limit",
+        type=click.FloatRange(0, min_open=True),
+        show_default="7/8 of the machine's",
+        help="GiB that code of your own, apart, may use.",
+    )
+    return apart(time(memory(command)))
 
 
 def chosen_executor(

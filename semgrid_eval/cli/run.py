@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
-from semgrid_eval.cli.options import FOLDER, THERE, chosen_executor, device_option, executor_options, workers_option
+from semgrid_eval.cli.options import (
+    FOLDER,
+    THERE,
+    chosen_executor,
+    device_option,
+    executor_options,
+    own_model_options,
+    workers_option,
+)
 from semgrid_eval.errors import printable
 from semgrid_eval.executors import local_executor
 from semgrid_eval.ray_executor import LOCAL
@@ -34,6 +42,7 @@ _MODEL = "One more row: a model of your own, path.py:Class, or an installed one.
 @click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Rows trained at once.")
 @workers_option("Logs made into grids at once.")
 @executor_options
+@own_model_options
 @click.option("--gpus", type=click.FloatRange(0), default=0.0, help="With Ray: GPUs for each row; fractions share one.")
 @click.option(
     "--pictures/--no-pictures", default=True, show_default=True, help="Keep small pictures for the report's examples."
@@ -53,6 +62,9 @@ def command(
     workers: int,
     executor: str,
     address: str,
+    own_models: str,
+    time_limit: float,
+    memory_limit: float | None,
     gpus: float,
     *,
     pictures: bool,
@@ -66,25 +78,37 @@ def command(
     Rows can be spread over processes of this machine (--jobs) or over a Ray cluster (--executor ray), whose machines
     must all reach the folders of logs, grids and the run under the same paths.
 
-    --model adds a row named after the class, with the defaults of MATRIX.
+    --model adds a row named after the class, with the defaults of MATRIX. Models of your own run in processes apart, so
+    that one that hangs, crashes or ends its process is a row that fails; their code has all your rights there, too.
 
     --dry-run builds the grids, which a run then finds, times a few updates of each network, and prints the plan.
     """
     from semgrid_eval.models.device import visible_gpus
+    from semgrid_eval.models.memory import guest_limits
+    from semgrid_eval.models.registry import own_models as run_own_models
     from semgrid_eval.runs.matrix import load_matrix
-    from semgrid_eval.runs.runner import RunOptions, run_matrix, wanted_rows
+    from semgrid_eval.runs.runner import RunOptions
 
-    resolved = load_matrix(matrix, models=models)
-    shared = visible_gpus() if device in ("auto", "cuda") else ()
-    rows_on = chosen_executor(executor, address, jobs, gpus=gpus, shared=shared)
-    # A cluster that is started here has --jobs cores, and grids are to be built on --workers.
-    grids_on = local_executor(workers) if address == LOCAL else chosen_executor(executor, address, workers)
-    kept = grids or out / "grids"
-    options = RunOptions(device, kept, command_line(), only, rows_on, grids_on, pictures, validation_logs, trainings)
-    if dry_run:
-        return _show_plan(resolved, logs, out, options)
-    record = run_matrix(resolved, logs, out, options, stage=progress)
-    code = show_run(record, {row.name for row in wanted_rows(resolved, only)})
+    with run_own_models(guest_limits(time_limit, memory_limit) if own_models == "apart" else None):
+        resolved = load_matrix(matrix, models=models)
+        shared = visible_gpus() if device in ("auto", "cuda") else ()
+        rows_on = chosen_executor(executor, address, jobs, gpus=gpus, shared=shared)
+        # A cluster that is started here has --jobs cores, and grids are to be built on --workers.
+        grids_on = local_executor(workers) if address == LOCAL else chosen_executor(executor, address, workers)
+        kept = grids or out / "grids"
+        options = RunOptions(
+            device, kept, command_line(), only, rows_on, grids_on, pictures, validation_logs, trainings
+        )
+        work = _show_plan if dry_run else _run
+        code = work(resolved, logs, out, options)
+    return code  # noqa: RET504 - mypy takes the block for one that may swallow errors
+
+
+def _run(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -> int:
+    from semgrid_eval.runs.runner import run_matrix, wanted_rows
+
+    record = run_matrix(matrix, logs, out, options, stage=progress)
+    code = show_run(record, {row.name for row in wanted_rows(matrix, options.only)})
     click.echo(out)
     return code
 

@@ -3,13 +3,40 @@
 import importlib
 import importlib.util
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_files, digest_value
+
+
+@dataclass(frozen=True)
+class Code:
+    """The files that make a model of one's own."""
+
+    sources: tuple[Path, ...]
+    folder: Path  # of the files that it declares
+
+    def version(self, files: Sequence[str], name: str, package: str | None) -> str:
+        """Digest the code with the files that it declares, and the version of the package that it is of, if it is.
+
+        Raises:
+            InputError: a declared file is missing.
+        """
+        for each in files:
+            if not (self.folder / each).is_file():
+                raise InputError(f"declares the file {each}, which is not in {self.folder}", field=f"{name}: files")
+        digest = digest_files([*self.sources, *(self.folder / each for each in files)])
+        return digest if package is None else digest_value([package, digest])
+
+
+def require_python(path: Path) -> None:
+    """Make sure that a path may be a model's file; an InputError says that it is not."""
+    if not path.is_file() or path.suffix != ".py":
+        raise InputError("is not a Python file; a model is given as path.py:Class", path=path)
 
 
 class ModelFile:
@@ -35,9 +62,10 @@ class ModelFile:
         """
         # The name stays known, since dataclasses and pickle look a class's module up by it.
         name = f"semgrid_eval_own_{digest_value(str(self._path.resolve()))}_{self._path.stem}"
+        require_python(self._path)
         spec = importlib.util.spec_from_file_location(name, self._path)
-        if not self._path.is_file() or spec is None or spec.loader is None:
-            raise InputError("is not a Python file; a model is given as path.py:Class", path=self._path)
+        assert spec is not None
+        assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         # What the caller has imported from beside the file is imported again, so that it is known as a source.
         others = {each for each in sys.modules if not each.startswith(("semgrid_eval", "__main__"))}

@@ -8,6 +8,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from semgrid_eval.apart import Limits
 from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.device import seeded
@@ -68,6 +69,12 @@ def memory_bytes(device: torch.device) -> int:
         return min(machine, int(_LIMIT_FILE.read_text()))
     except (OSError, ValueError):  # there is no limit
         return machine
+
+
+def guest_limits(time_s: float | None = Limits.time_s, memory_gib: float | None = None) -> Limits:
+    """Return the limits of models of one's own; of memory seven eighths of the machine's, if nothing is given."""
+    usual = memory_bytes(torch.device("cpu")) // 8 * 7
+    return Limits(time_s, usual if memory_gib is None else int(memory_gib * _GIB))
 
 
 def _batch(given: Given, count: int) -> WindowBatch:

@@ -1,6 +1,5 @@
 """What every model is to a run, built in or one's own: settings, what a row gives it, and its answer."""
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -60,7 +59,7 @@ class Model:
     files: ClassVar[tuple[str, ...] | None] = None
     """Files beside its module that it reads (weights): all of them, so that its results can be kept, or None."""
     # Leads that it can be asked for, in s, and whether what it learned answers them all: one training, any lead.
-    leads_s: ClassVar[tuple[float, float]] = (0.0, math.inf)
+    leads_s: ClassVar[tuple[float, float]] = (0.0, 1e6)
     any_lead: ClassVar[bool] = False
     version: ClassVar[str] = "1"  # part of all ids: counted up by whoever changes the numbers of a built-in model
 

@@ -19,7 +19,15 @@ from semgrid_eval.windows.data import WindowBatch, WindowSet
 if TYPE_CHECKING:
     from semgrid_eval.grids.truth import Truth
 
-_ATTRIBUTES = {"words": str, "family": str, "baseline": bool, "random": bool, "files": tuple | None, "bound": str}
+_ATTRIBUTES = {
+    "words": str,
+    "family": str,
+    "baseline": bool,
+    "random": bool,
+    "any_lead": bool,
+    "files": tuple | None,
+    "bound": str,
+}
 
 
 class _Guarded(Model):

@@ -2,13 +2,18 @@
 
 import importlib.metadata
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
+from semgrid_eval.apart import Limits
 from semgrid_eval.errors import InputError
-from semgrid_eval.files import digest_files, digest_value
-from semgrid_eval.models.beside import ModelFile
+from semgrid_eval.models.beside import Code, ModelFile, require_python
+from semgrid_eval.models.host import end_guests, known_answers, learn_answers
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.own import guarded, one_line
+from semgrid_eval.models.stand_in import StandIn, stand_in
 
 ENTRY_POINT_GROUP = "semgrid_eval.models"
 _HERE = "semgrid_eval.models"
@@ -27,6 +32,8 @@ MODELS = {
 }
 """Where the class of each built-in model lies; a new model is its module, its test and a line here."""
 _loaded: dict[str, tuple[ModelFile, type[Model]]] = {}
+_limits: ContextVar[Limits | None] = ContextVar("limits of models of one's own; None where they run in this process")
+_USUAL = Limits()
 
 
 def find_model(name: str) -> type[Model]:
@@ -49,6 +56,45 @@ def find_model(name: str) -> type[Model]:
     return guarded(cls, name, None)
 
 
+def described(name: str) -> type[Model]:
+    """Find a model as `find_model` does; of one's own, a stand-in for its class in a process apart.
+
+    Raises:
+        InputError: there is no such model, its code cannot be loaded, or ends its process or runs out of its time.
+    """
+    limits = _limits.get(_USUAL)
+    if name in MODELS or limits is None:
+        return find_model(name)
+    if ":" in name:
+        require_python(Path(name.rpartition(":")[0]))
+    else:
+        _entry_point(name)
+    return stand_in(name, limits)
+
+
+@contextmanager
+def own_models(limits: Limits | None) -> Iterator[None]:
+    """Run models of one's own within these limits in processes apart, or in this one, while the block lasts."""
+    before = _limits.set(limits)
+    try:
+        yield
+    finally:
+        _limits.reset(before)
+        end_guests()
+
+
+def ways_of_own_models() -> tuple[Limits | None, str]:
+    """Return what another process must know to treat models of one's own as this one does: see `adopt`."""
+    return _limits.get(_USUAL), known_answers()
+
+
+def adopt(limits: Limits | None, known: str) -> None:
+    """Treat models of one's own from now on as another process does, and know what it has asked them."""
+    _limits.set(limits)
+    if limits is not None:
+        learn_answers(known, limits)
+
+
 def version_of(name: str) -> str:
     """Return what tells a model's code from other code of the same name, and the files that it declares; part of ids.
 
@@ -58,13 +104,21 @@ def version_of(name: str) -> str:
     Raises:
         InputError: there is no such model, its code cannot be loaded, or it lacks a declared file.
     """
+    made = described(name)
     if name in MODELS:
-        return find_model(name).version
+        return made.version
+    code = made.code() if issubclass(made, StandIn) else find_code(name)
+    return code.version(made.files or (), name, None if ":" in name else installed_models()[name])
+
+
+def find_code(name: str) -> Code:
+    """Find the files of a model of one's own, whose code runs in this process."""
     if ":" in name:
-        file, cls = _from_file(name)
-        return digest_files([*file.sources(), *_declared(cls, file.folder, name)])
-    cls, module = find_model(name), Path(str(sys.modules[_entry_point(name).module].__file__))
-    return digest_value([installed_models()[name], digest_files([module, *_declared(cls, module.parent, name)])])
+        file = _from_file(name)[0]
+        return Code(tuple(file.sources()), file.folder)
+    find_model(name)
+    module = Path(str(sys.modules[_entry_point(name).module].__file__))
+    return Code((module,), module.parent)
 
 
 def is_named(name: str) -> bool:
@@ -96,10 +150,3 @@ def _entry_point(name: str) -> importlib.metadata.EntryPoint:
         names = ", ".join(sorted(known.names)) or "none"
         raise InputError(f"no model {name!r} is installed ({names} found); a file is given as path.py:Class")
     return known[name]
-
-
-def _declared(cls: type[Model], folder: Path, spec: str) -> list[Path]:
-    for name in cls.files or ():
-        if not (folder / name).is_file():
-            raise InputError(f"declares the file {name}, which is not in {folder}", field=f"{spec}: files")
-    return [folder / name for name in cls.files or ()]

@@ -24,6 +24,7 @@ class Resolved:
     model: type[Model]
     settings: Config
     version: str  # tells its code, and files that it declares, from others of the same name
+    is_own: bool = False  # whether it is code of one's own
 
     @property
     def is_known(self) -> bool:

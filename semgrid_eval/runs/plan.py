@@ -10,9 +10,9 @@ import torch
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_value
 from semgrid_eval.models.checkpoint import HISTORY_FILE, read_history
-from semgrid_eval.models.memory import require_room
-from semgrid_eval.models.network import Network, NetworkSettings, ScheduleConfig, TrainingConfig, seeded_network
-from semgrid_eval.models.training import train
+from semgrid_eval.models.fitting import Lesson
+from semgrid_eval.models.network import NetworkSettings, ScheduleConfig, TrainingConfig
+from semgrid_eval.models.stand_in import make_ready
 from semgrid_eval.progress import Stage, silent_stage
 from semgrid_eval.runs.job import Job, Training
 from semgrid_eval.runs.matrix import Matrix
@@ -118,15 +118,14 @@ class _Speed:
 
     def _measure(self, job: Job, sample: NetworkSettings) -> float:
         assert job.training is not None
-        assert issubclass(job.resolved.model, Network)
-        require_room(job.resolved.model, sample, job.row.given, self._worker.device)
-        network = seeded_network(job.resolved.model, sample, job.row.given, seed=0)
         threads = torch.get_num_threads()
         torch.set_num_threads(self._worker.threads)
         try:
             with tempfile.TemporaryDirectory() as folder:
                 windows, device = job.training.windows, self._worker.device
-                trained = train(network, windows, seed=0, device=device, folder=Path(folder))
+                lesson = Lesson(job.row.given, 0, device, windows, folder=Path(folder))
+                fitted = make_ready(job.resolved.model, sample, lesson)
         finally:
             torch.set_num_threads(threads)
-        return min(epoch.seconds for epoch in trained.history) / sample.training.updates_per_epoch
+        assert fitted.epochs_s is not None, "a network was trained"
+        return min(fitted.epochs_s) / sample.training.updates_per_epoch

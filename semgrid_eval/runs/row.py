@@ -12,7 +12,7 @@ from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import Truth
 from semgrid_eval.models.model import Given, Model
-from semgrid_eval.models.registry import MODELS, find_model, installed_models, is_named
+from semgrid_eval.models.registry import MODELS, described, installed_models, is_named
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.facts import RowFacts, StreamFacts
 from semgrid_eval.streams.config import StreamConfig
@@ -22,7 +22,7 @@ from semgrid_eval.windows.disturb.kinds import AnyDisturbance
 
 def _found(model: str) -> type[Model] | None:
     try:
-        return find_model(model)
+        return described(model)
     except InputError:  # told when the row's turn comes
         return None
 

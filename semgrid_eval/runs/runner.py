@@ -9,12 +9,13 @@ from pathlib import Path
 
 import torch
 
+from semgrid_eval.apart import Limits
 from semgrid_eval.errors import ConfigError, SemgridError, first_line
 from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import Question
 from semgrid_eval.models.device import choose_device, is_out_of_memory, settle_process
-from semgrid_eval.models.registry import MODELS
+from semgrid_eval.models.registry import MODELS, adopt, ways_of_own_models
 from semgrid_eval.places import remove_stale
 from semgrid_eval.progress import Progress, Stage, silent, silent_stage
 from semgrid_eval.runs.data import GridSource, RunData
@@ -109,10 +110,10 @@ def _look_into_logs(worker: Worker, rows: Sequence[Row], first_seed: int, option
 
 
 def _lost(out: Path, outcomes: Mapping[str, Outcome]) -> dict[str, Outcome]:
-    """Find the units whose results somebody has removed meanwhile."""
+    """Find the units whose results somebody has removed or damaged meanwhile."""
     there = {key: found.result_id for key, found in outcomes.items() if found.result_id is not None}
-    lost = Outcome(None, "its result was removed while the run went on; the same command makes it again", {})
-    return {key: lost for key, found in there.items() if not results.result_folder(out, found).is_dir()}
+    lost = Outcome(None, "its result was removed or damaged while the run went on; run again to make it again", {})
+    return {key: lost for key, found in there.items() if not results.is_done(results.result_folder(out, found))}
 
 
 def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:
@@ -191,7 +192,7 @@ def _unit_work(
     )
     place = (matrix.model_dump_json(), logs.resolve(), out.resolve(), there, options.executor.threads)
     with worker.stage("rows") as progress:
-        yield partial(_attempt_elsewhere, place), progress
+        yield partial(_attempt_elsewhere, place, ways_of_own_models()), progress
 
 
 def _finished(worker: Worker, unit: Unit) -> Outcome | None:
@@ -215,7 +216,10 @@ def failure_of(error: Exception, row: Row) -> str | None:
     return None
 
 
-def _attempt_elsewhere(place: tuple[str, Path, Path, RunOptions, int | None], unit: Unit) -> Outcome:
+def _attempt_elsewhere(
+    place: tuple[str, Path, Path, RunOptions, int | None], ways: tuple[Limits | None, str], unit: Unit
+) -> Outcome:
+    adopt(*ways)
     return _attempt(_worker_at(*place), unit)
 
 

@@ -78,7 +78,7 @@ def _limits_ns(row: Row, data: GridData) -> tuple[int, int]:
         return row.train_leads[0] * period, row.train_leads[1] * period
     model = row.found_model()
     shortest_s, longest_s = model.leads_s if model else (0.0, 1e6)
-    return int(shortest_s * 1e9), int(min(longest_s, 1e6) * 1e9)
+    return int(shortest_s * 1e9), int(longest_s * 1e9)
 
 
 def stream_record(plan: StreamPlan) -> StreamRecord:

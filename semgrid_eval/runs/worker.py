@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -18,11 +19,11 @@ from semgrid_eval.grids.truth import Question, truth_versions
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
 from semgrid_eval.models.checkpoint import read_history, write_history
 from semgrid_eval.models.device import choose_precision, seeded
-from semgrid_eval.models.memory import require_room
-from semgrid_eval.models.model import Model, parameter_count
-from semgrid_eval.models.network import Network, NetworkSettings, seeded_network
-from semgrid_eval.models.registry import find_model, version_of
-from semgrid_eval.models.training import train
+from semgrid_eval.models.fitting import Fitted, Lesson
+from semgrid_eval.models.model import Model
+from semgrid_eval.models.network import Network, NetworkSettings
+from semgrid_eval.models.registry import MODELS, described, version_of
+from semgrid_eval.models.stand_in import make_ready
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.data import GridSource, grid_digest
 from semgrid_eval.runs.job import SCORING_VERSION, Job, Resolved, Training, id_of_windows, target_key, window_records
@@ -30,6 +31,7 @@ from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.selection import Selection, Wanted
 from semgrid_eval.runs.stream import block_records, identity_of, plan_row, stream_record
 from semgrid_eval.runs.truth import EXPECTED, expected_target, parts_of, told
+from semgrid_eval.runs.watch import unchanged
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
 from semgrid_eval.streams.evaluate import evaluate_stream
@@ -70,8 +72,8 @@ class Worker:
 
     def look(self, row: Row, seed: int | None) -> Job:
         """Resolve a row with one seed into its model, its windows, its training and the id of its result."""
-        model = find_model(row.model)
-        resolved = Resolved(model, model.parse_settings(row.settings), version_of(row.model))
+        model = described(row.model)
+        resolved = Resolved(model, model.parse_settings(row.settings), version_of(row.model), row.model not in MODELS)
         stream = self.stream(row) if row.stream else None
         scored, left_out = (stream.answers, dict[str, str]()) if stream else self.scored_windows(row)
         windows_id = digest_value(stream.digest()) if stream else id_of_windows(row, scored)
@@ -106,11 +108,12 @@ class Worker:
         folder = results.result_folder(self.out, job.result_id)
         if job.resolved.is_known and not self._is_to_be_made(job, folder):
             return job
-        with seeded(seed or 0, self.device):
-            model, train_seconds = self._fitted(job)
-            evaluation = self._evaluated(job, model)
+        watched = unchanged(self.out, row.model) if job.resolved.is_own else nullcontext()
+        with watched, seeded(seed or 0, self.device):
+            fitted = self._fitted(job)
+            evaluation = self._evaluated(job, fitted.model)
         self._keep_windows(job)  # code of one's own may have removed them
-        record = self._result_record(job, model, train_seconds, evaluation)
+        record = self._result_record(job, fitted, evaluation)
         _keep_result(folder, record, evaluation, self._history(job), with_predictions=self._shows(job))
         return job
 
@@ -209,27 +212,18 @@ class Worker:
         )
         return Training(training_id, self.trainings / training_id, windows, watched)
 
-    def _fitted(self, job: Job) -> tuple[Model, float | None]:
-        """Return the job's model, ready to predict, and how many seconds gradients have trained it."""
-        made, settings, training, seed = job.resolved.model, job.resolved.settings, job.training, job.seed or 0
-        if training and issubclass(made, Network):
-            require_room(made, settings, job.row.given, self.device)
-            network = seeded_network(made, settings, job.row.given, seed)
-            train_it = partial(train, network, training.windows, seed=seed, device=self.device, folder=training.folder)
-            with self.stage(f"train {job.row.name} (seed {seed})") as progress:
-                trained = train_it(progress=progress, validation=training.watched)
-            return trained.network, round(trained.seconds, 3)
-        model = made(settings, job.row.given)
-        if isinstance(model, torch.nn.Module):
-            model.to(self.device).eval()
-        if training:
-            with self.stage(f"fit {job.row.name}"):
-                model.fit(training.windows)
-        return model, None
+    def _fitted(self, job: Job) -> Fitted:
+        """Make the job's model ready to predict."""
+        made, settings, seed = job.resolved.model, job.resolved.settings, job.seed or 0
+        lesson = Lesson(job.row.given, seed, self.device)
+        if job.training is None:
+            return make_ready(made, settings, lesson)
+        training, is_network = job.training, issubclass(made, Network)
+        lesson = replace(lesson, windows=training.windows, watched=training.watched, folder=training.folder)
+        with self.stage(f"train {job.row.name} (seed {seed})" if is_network else f"fit {job.row.name}") as progress:
+            return make_ready(made, settings, lesson, progress)
 
-    def _result_record(
-        self, job: Job, model: Model, train_seconds: float | None, evaluation: Evaluation
-    ) -> results.ResultRecord:
+    def _result_record(self, job: Job, fitted: Fitted, evaluation: Evaluation) -> results.ResultRecord:
         log_of = self.scored_data.log_of
         return results.ResultRecord(
             format_version=results.FORMAT_VERSION,
@@ -244,9 +238,9 @@ class Worker:
             windows_id=job.windows_id,
             windows=block_records(job.stream, log_of) if job.stream else window_records(job.scored, log_of),
             device=str(self.device),
-            train_seconds=train_seconds,
+            train_seconds=fitted.train_seconds,
             predict_seconds=round(evaluation.seconds, 6),
-            parameters=parameter_count(model),
+            parameters=fitted.parameters,
             has_expected=evaluation.expected_sums is not None,
         )
 

@@ -211,3 +211,15 @@ def test_what_is_damaged_is_made_again_with_a_line_each(here, capsys):
     said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("Warning: ")]
     for pattern, word in kinds.items():
         assert [line for line in said if pattern.partition("/")[0] in line and f"the {word}" in line], said
+
+
+def test_a_model_that_ends_its_process_is_a_row_that_fails(here, capsys):
+    (here / "mine.py").write_text("import os\nos._exit(4)\n")
+    rows = [{"name": "mine", "model": "mine.py:Mine"}, {"name": "BL", "model": "newest"}]
+    with pytest.raises(SystemExit) as ended:
+        main(
+            ["run", matrix(here, rows), "--logs", "logs", "--out", "out", "--memory-limit", "4", "--time-limit", "900"]
+        )
+    assert ended.value.code == 1
+    assert "Error: row mine: mine.py:Mine: ended its process with exit code 4\n" in capsys.readouterr().err
+    assert [row.failure is None for row in read_run(here / "out").rows] == [False, True]

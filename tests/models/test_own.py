@@ -11,7 +11,7 @@ from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.model import Model, require_scores
 from semgrid_eval.models.network import Network
-from semgrid_eval.models.registry import ENTRY_POINT_GROUP, find_model, is_named, version_of
+from semgrid_eval.models.registry import ENTRY_POINT_GROUP, find_model, is_named, own_models, version_of
 from semgrid_eval.windows.data import Window, select_windows
 from semgrid_eval.windows.grids import stack_recordings
 
@@ -85,6 +85,13 @@ constant = 7
 class Alone:
     pass
 """
+
+
+@pytest.fixture(autouse=True)
+def here():
+    """Models run in this process."""
+    with own_models(None):
+        yield
 
 
 @pytest.fixture

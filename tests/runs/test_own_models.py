@@ -6,9 +6,10 @@ import pytest
 import torch
 from support.small_runs import run, write_logs
 
+from semgrid_eval.apart import Limits
 from semgrid_eval.executors import Processes
-from semgrid_eval.models.registry import ENTRY_POINT_GROUP
-from semgrid_eval.runs import worker
+from semgrid_eval.models import fitting
+from semgrid_eval.models.registry import ENTRY_POINT_GROUP, own_models
 from semgrid_eval.scores import results
 from semgrid_eval.scores.metrics.iou import category_iou, class_iou
 
@@ -36,6 +37,13 @@ class Small(Network):
         return super().loss(logits, batch) + 0.01 * logits.square().mean()
 """
 TRAINING = {"epochs": 2, "updates_per_epoch": 3, "batch": 2}
+
+
+@pytest.fixture(autouse=True)
+def here():
+    """Models run in this process, which is quicker; `test_own_models_apart` has what is different in another."""
+    with own_models(None):
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -95,9 +103,9 @@ def test_an_own_network_ends_in_the_same_bytes_after_a_stop_and_in_other_process
         files = [*out.glob("results/*/sums.npz"), *out.glob("trainings/*/weights.safetensors")]
         return {str(path.relative_to(out)): path.read_bytes() for path in files}
 
-    whole, stopped, elsewhere = (tmp_path / name for name in ("whole", "stopped", "elsewhere"))
+    whole, stopped, elsewhere, apart = (tmp_path / name for name in ("whole", "stopped", "elsewhere", "apart"))
     run([own_row(small)], logs, whole)
-    trained = worker.train
+    trained = fitting.train
 
     def stop_after_an_epoch(*arguments, **options):
         def progress(done, total, message=""):
@@ -106,15 +114,17 @@ def test_an_own_network_ends_in_the_same_bytes_after_a_stop_and_in_other_process
 
         return trained(*arguments, **options | {"progress": progress})
 
-    monkeypatch.setattr(worker, "train", stop_after_an_epoch)
+    monkeypatch.setattr(fitting, "train", stop_after_an_epoch)
     with pytest.raises(KeyboardInterrupt):
         run([own_row(small)], logs, stopped)
     assert len(list(stopped.glob("trainings/*/checkpoint.pt"))) == 1
     monkeypatch.undo()
     run([own_row(small)], logs, stopped)
     run([own_row(small)], logs, elsewhere, Processes(2, threads=torch.get_num_threads()))
+    with own_models(Limits()):
+        run([own_row(small)], logs, apart)
     assert len(outputs(whole)) == 2
-    assert outputs(whole) == outputs(stopped) == outputs(elsewhere)
+    assert outputs(whole) == outputs(stopped) == outputs(elsewhere) == outputs(apart)
 
 
 def test_a_network_is_told_apart_by_its_file_its_neighbours_and_its_settings(logs, tmp_path, small):
@@ -333,12 +343,16 @@ def test_rows_whose_results_a_model_removes_are_named_and_made_again(logs, tmp_p
     rows.append({"name": "BL-Fuse", "model": "fuse"})
     record = run(rows, logs, tmp_path / "run")
     failures = {row.name: row.failure for row in record.rows}
-    assert "its result was removed while the run went on" in failures.pop("BL-DC")
-    assert failures == {"vandal": None, "BL-Fuse": None}
+    assert "its result was removed or damaged while the run went on" in failures.pop("BL-DC")
+    gone = failures.pop("vandal").partition("vandal.py:Vandal: changed or removed ")[2]
+    assert f"results/{record.rows[2].results[0]}" not in gone
+    assert gone.startswith("results/")
+    assert gone.endswith(" in the run's folder")
+    assert failures == {"BL-Fuse": None}
     assert results.read_run(tmp_path / "run") == record
-    again = run(rows, logs, tmp_path / "run")
-    assert [row.failure for row in again.rows] == [None] * 3
-    for row in again.rows:
+    again = run(rows, logs, tmp_path / "run", only=("BL-*",))
+    assert [row.failure for row in again.rows] == [None, results.NOT_RUN, None]
+    for row in (again.rows[0], again.rows[2]):
         results.read_windows(
             tmp_path / "run", results.read_result(results.result_folder(tmp_path / "run", row.results[0])).windows_id
         )

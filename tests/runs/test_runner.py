@@ -217,13 +217,13 @@ def test_mask_modes_differ_in_the_row_of_unknown_only(logs, tmp_path, mode):
 
 
 @pytest.mark.parametrize(
-    ("place", "others"), [("worker.train", None), ("data.stack_recordings", "out of memory: CUDA")]
+    ("place", "others"), [("models.fitting.train", None), ("runs.data.stack_recordings", "out of memory: CUDA")]
 )
 def test_a_row_that_has_no_room_is_noted_and_the_others_go_on(logs, tmp_path, monkeypatch, place, others):
     def no_room(*_args, **_kwargs):
         raise torch.OutOfMemoryError("CUDA out of memory.\nTried to allocate 2 GiB")
 
-    monkeypatch.setattr(f"semgrid_eval.runs.{place}", no_room)
+    monkeypatch.setattr(f"semgrid_eval.{place}", no_room)
     rows = [{"name": "ED", "model": "ed"}, {"name": "BL", "model": "newest"}]
     record = run(rows, logs, tmp_path / "run")
     assert record.rows[0].failure == "out of memory: CUDA out of memory."

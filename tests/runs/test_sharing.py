@@ -112,7 +112,7 @@ def test_what_libraries_raise_is_a_reason_and_the_others_go_on(work, monkeypatch
     def fail(*_args, **_kwargs):
         raise RuntimeError(message)
 
-    monkeypatch.setattr("semgrid_eval.runs.worker.train", fail)
+    monkeypatch.setattr("semgrid_eval.models.fitting.train", fail)
     assert failures(work([ED, BL])) == {"ED": told, "BL": None}
 
 
@@ -122,7 +122,7 @@ def test_a_row_whose_sample_cannot_be_trained_does_not_end_the_plan(work, logs, 
     def fail(*_args, **_kwargs):
         raise torch.OutOfMemoryError("CUDA out of memory.\nTried to allocate")
 
-    monkeypatch.setattr(plan, "train", fail)
+    monkeypatch.setattr(plan, "make_ready", fail)
     (tmp_path / "matrix.yaml").write_text(yaml.safe_dump({"models": TINY, "rows": [ED, BL]}))
     units = plan.plan_run(load_matrix(str(tmp_path / "matrix.yaml")), logs, work.out, work.options)
     assert units[0].rows == ("ED",)
