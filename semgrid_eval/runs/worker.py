@@ -34,7 +34,7 @@ from semgrid_eval.runs.truth import EXPECTED, expected_target, parts_of, told
 from semgrid_eval.runs.watch import unchanged
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
-from semgrid_eval.streams.evaluate import evaluate_stream
+from semgrid_eval.streams.evaluate import Unseen, evaluate_stream
 from semgrid_eval.streams.plan import StreamPlan
 from semgrid_eval.windows.data import (
     WindowSet,
@@ -42,6 +42,7 @@ from semgrid_eval.windows.data import (
     validation_windows,
     window_arrays,
 )
+from semgrid_eval.windows.grids import GridData
 
 _log = logging.getLogger(__name__)
 
@@ -62,6 +63,7 @@ class Worker:
     example_seed: int  # of the results whose predictions are kept for a report's examples
     stage: Stage  # shows progress
     _windows: Selection = field(default_factory=Selection, init=False)
+    _unseen: tuple[tuple[GridData, bytes], Unseen] | None = field(default=None, init=False)  # M of the last stream
     # Ids of the windows that are known to lie in the run's folder.
     _kept: set[str] = field(default_factory=set, init=False)
 
@@ -146,9 +148,17 @@ class Worker:
                 spec=row.grid.spec,
                 move=row.stream.move,
                 mask_mode=row.mask_mode,
+                unseen=self._unseen_at(plan),
                 progress=progress,
             )
         return Evaluation(found.sums, nothing, nothing, found.seconds)
+
+    def _unseen_at(self, plan: StreamPlan) -> Unseen:
+        """Work M out for the times of evaluation of a stream, or find it as another row has left it."""
+        key = (plan.answers.data, plan.evaluated.tobytes())
+        if self._unseen is None or self._unseen[0][0] is not key[0] or self._unseen[0][1] != key[1]:
+            self._unseen = key, Unseen(plan.answers.data, plan.evaluated)
+        return self._unseen[1]
 
     def is_done(self, job: Job) -> bool:
         """Tell whether all that a job leaves lies in the run's folder."""

@@ -35,6 +35,7 @@ def evaluate_stream(
     spec: GridSpec,
     move: bool,
     mask_mode: MaskMode = "exclude",
+    unseen: "Unseen | None" = None,
     batch: int = 16,
     progress: Progress = silent,
 ) -> StreamEvaluation:
@@ -47,6 +48,7 @@ def evaluate_stream(
         move: whether answers are moved from the vehicle's place at the time that they are for to its place at the time
             of evaluation.
         mask_mode: how the cells of M are treated, see `apply_mask`; M is `unseen_truth`.
+        unseen: M, if it is worked out already.
         batch: windows at once.
         progress: told of each batch of evaluations.
 
@@ -55,6 +57,7 @@ def evaluate_stream(
     """
     predictions = _Predictions(model, plan, batch)
     data, blocks = plan.answers.data, plan.blocks()
+    unseen = unseen or Unseen(data, plan.evaluated)
     total: dict[tuple[str, str], NDArray[np.int32]] = {}
     for start in range(0, len(plan.evaluated), batch):
         chosen = slice(start, start + batch)
@@ -62,7 +65,7 @@ def evaluate_stream(
         prediction, certainty = predictions.at(plan.used[chosen], frames, move=move)
         target = data.grids[data.sensor_index(data.target), torch.from_numpy(frames).to(data.grids.device)]
         truth = target.cpu().numpy()
-        answer, left_out = apply_mask(prediction, unseen_truth(data, frames), mask_mode)
+        answer, left_out = apply_mask(prediction, unseen.at(chosen), mask_mode)
         scored = ScoredWindows(
             target=truth,
             prediction=answer,
@@ -78,6 +81,20 @@ def evaluate_stream(
             np.add.at(total[key], blocks[chosen], counted)
         progress(min(start + batch, len(plan.evaluated)), len(plan.evaluated))
     return StreamEvaluation(total, predictions.seconds)
+
+
+class Unseen:
+    """M at times of evaluation, worked out once for all rows of the same ones, a bit a cell."""
+
+    def __init__(self, data: GridData, frames: NDArray[np.int64]) -> None:
+        self._size = data.grids.shape[-2:]
+        parts = [unseen_truth(data, part) for part in np.array_split(frames, max(1, len(frames) // 64))]
+        self._bits = np.packbits(np.concatenate(parts).reshape(len(frames), -1), axis=1)
+
+    def at(self, chosen: slice) -> NDArray[np.bool_]:
+        """Return M (E, H, W) at some of them."""
+        cells = np.unpackbits(self._bits[chosen], axis=1, count=self._size[0] * self._size[1])
+        return cells.reshape(-1, *self._size).view(np.bool_)
 
 
 def unseen_truth(data: GridData, frames: NDArray[np.int64]) -> NDArray[np.bool_]:
