@@ -55,6 +55,7 @@ class Entry(NamedTuple):
     topic: str
     log_ns: int
     data: bytes
+    publish_ns: int
 
 
 class Container:
@@ -194,7 +195,7 @@ class Container:
                     raise McapError("a message is outside the times that the index gives")
         for message in found:
             if message.channel_id in wanted:
-                yield Entry(wanted[message.channel_id], message.log_time, message.data)
+                yield Entry(wanted[message.channel_id], message.log_time, message.data, message.publish_time)
 
     def _chunk_records(self, index: records.ChunkIndex) -> list[records.McapRecord]:
         body = self._record(Opcode.CHUNK, index.chunk_start_offset, index.chunk_length)

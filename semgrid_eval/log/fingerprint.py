@@ -29,7 +29,7 @@ def fingerprint(path: Path) -> str:
     """
     total = hashlib.sha256()
     with LogReader(path) as log:
-        for topic, stamp_ns, data in log.messages(log.schemas()):
+        for topic, stamp_ns, data, _ in log.messages(log.schemas()):
             total.update(topic.encode() + b"\0")
             total.update(_MESSAGE.pack(stamp_ns, len(data)))
             total.update(data)

@@ -160,7 +160,7 @@ class LogReader(Container):
 
     def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
         """Iterate over what messages say; `decoders` maps topics to what reads their messages."""
-        for topic, stamp_ns, data in self.messages(decoders):
+        for topic, stamp_ns, data, _ in self.messages(decoders):
             with damage_as_log_error(self.path):
                 value = decoders[topic](data)
             yield Decoded(topic, stamp_ns, value)

@@ -11,7 +11,7 @@ from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import Truth
-from semgrid_eval.models.model import Given, Model
+from semgrid_eval.models.model import AnswersIn, Given, Model
 from semgrid_eval.models.registry import MODELS, find_model, installed_models, is_named
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.facts import RowFacts, StreamFacts
@@ -102,11 +102,15 @@ class Row(Config):
             return
         if self.asked is not None:
             raise ValueError("disturb: a row that is told of the truth has no inputs to disturb")
+        if self.answers_in is not None:
+            raise ValueError("disturb: answers that were made elsewhere have no inputs to disturb")
         self.disturb.check(self.window.inputs)
 
     def _check_stream(self) -> None:
         if self.stream is None:
             return
+        if self.stream.recorded != (self.answers_in is not None):
+            raise ValueError("stream.recorded: true where answers and their times lie in logs, and there alone")
         if self.disturb is not None or self.second_target is not None:
             raise ValueError("stream: a stream has neither disturbed inputs nor a second target")
         if self.asked is not None and self.stream.asked != "exact":
@@ -156,6 +160,12 @@ class Row(Config):
         return found.asks(found.parse_settings(self.settings), self.given) if found else None
 
     @property
+    def answers_in(self) -> AnswersIn | None:
+        """Where its answers are, if they were made elsewhere."""
+        found = self.found_model()
+        return found.answers_in(found.parse_settings(self.settings)) if found else None
+
+    @property
     def facts(self) -> RowFacts:
         """What the row is, whatever it is called."""
         found = self.found_model()
@@ -180,7 +190,8 @@ class Row(Config):
         if self.stream is None:
             return None
         words = self.stream.model_copy(update={"added_ms": 0.0}).words
-        return StreamFacts(words=words, added_ms=self.stream.added_ms, asked=self.stream.asked)
+        asked = "recorded" if self.stream.recorded else self.stream.asked
+        return StreamFacts(words=words, added_ms=self.stream.added_ms, asked=asked)
 
     @property
     def label(self) -> str:

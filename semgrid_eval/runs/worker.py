@@ -26,6 +26,7 @@ from semgrid_eval.models.training import train
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.data import GridSource, grid_digest
 from semgrid_eval.runs.job import SCORING_VERSION, Job, Resolved, Training, id_of_windows, target_key, window_records
+from semgrid_eval.runs.recorded import RecordedRows
 from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.selection import Selection, Wanted
 from semgrid_eval.runs.stream import block_records, identity_of, plan_row, stream_record
@@ -60,6 +61,7 @@ class Worker:
     example_seed: int  # of the results whose predictions are kept for a report's examples
     stage: Stage  # shows progress
     _windows: Selection = field(default_factory=Selection, init=False)
+    _recorded: RecordedRows = field(default_factory=RecordedRows, init=False)
     # Ids of the windows that are known to lie in the run's folder.
     _kept: set[str] = field(default_factory=set, init=False)
 
@@ -76,7 +78,8 @@ class Worker:
         scored, left_out = (stream.answers, dict[str, str]()) if stream else self.scored_windows(row)
         windows_id = digest_value(stream.digest()) if stream else id_of_windows(row, scored)
         training = self._training(resolved, row, seed, scored) if resolved.model.learns() else None
-        config = {**row.identity(), **identity_of(row), "code": resolved.version}
+        told = identity_of(row) | self._recorded.identity(row, scored)
+        config = {**row.identity(), **told, "code": resolved.version}
         if asks_of_truth(row) and self.scored_data.cache is not None:
             config["truth"] = truth_versions()
         learned = [training and training.id, seed]
@@ -87,7 +90,7 @@ class Worker:
         """Plan the stream of a row: over all recordings that are scored, from their first frames to their last."""
         data = self.scored_data.data(row.grid, row.scored_split)
         wanted = Wanted(row.scored_split, row.scored_window, validation_windows, (), row.hold_out, held_out=True)
-        return plan_row(row, data, sorted(wanted.recordings(data.groups)))
+        return plan_row(row, data, sorted(wanted.recordings(data.groups)), self._recorded.of(row))
 
     def scored_windows(self, row: Row) -> tuple[WindowSet, dict[str, str]]:
         """Select the windows on which a row is scored, and say why some logs give none; of a stream its answers."""
@@ -126,6 +129,7 @@ class Worker:
         expected = expected_target(scored, row.grid, cache) if row.second_target else None
         if row.asked is not None:
             scored = replace(scored, truth=told(row.asked, scored, row.grid, cache))
+        scored = replace(scored, answers=self._recorded.told(row, scored, job.stream))
         if job.stream is not None:
             return self._streamed(job, model, replace(job.stream, answers=scored))
         score = partial(evaluate, model, scored, mask_mode=row.mask_mode, spec=row.grid.spec, expected=expected)

@@ -87,7 +87,7 @@ def frame_poses(log: "LogReader", sensor: CameraSensor, integrator: Integrator) 
     """
     topic = camera_topic(log.choose_camera(sensor.camera), DISPARITY)
     motion = EgoMotion(log.motion(), integrator)
-    return [motion.pose_at(stamp_ns) for _, stamp_ns, _ in log.messages([topic])]
+    return [motion.pose_at(stamp_ns) for _, stamp_ns, _, _ in log.messages([topic])]
 
 
 def _read_camera(

@@ -70,7 +70,7 @@ def test_a_shift_moves_all_times(log):
 
 
 def test_transforms_are_those_of_the_log(log):
-    kept = [data for _, _, data in log.messages([TRANSFORMS])]
+    kept = [entry.data for entry in log.messages([TRANSFORMS])]
     found = [
         m.message.SerializeToString(deterministic=True)
         for m in sent(Backdrop(log, grid_of("front")), 0, 5)
