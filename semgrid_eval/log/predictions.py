@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.files import atomic_file
 from semgrid_eval.log.codec import stamp_ns, timestamp
-from semgrid_eval.log.container import MAX_STAMP_NS, Container, Entry, damage_as_log_error
+from semgrid_eval.log.container import MAX_STAMP_NS, Container, Entry
 from semgrid_eval.log.grids import CLASSES, GridPlace, exact_message
 from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
 from semgrid_eval.log.topics import GRID_PREDICTION
@@ -132,13 +133,13 @@ class PredictionLog(Container):
             raise LogError("has no message", path=self.path, field=self.topic)
 
     def _decoded(self, entry: Entry, extent: GridExtent) -> Prediction:
-        with damage_as_log_error(self.path):
+        try:
             message = SemanticGrid.FromString(entry.data)
-        fault = _fault_of_message(message, extent)
-        if fault:
-            raise self._error(entry, fault)
-        with damage_as_log_error(self.path):
+            if fault := _fault_of_message(message, extent):
+                raise self._error(entry, fault)
             for_ns, capture_ns = stamp_ns(message.timestamp), stamp_ns(message.capture_time)
+        except (DecodeError, ValueError) as error:
+            raise self._error(entry, f"is damaged: {error}") from error
         shape = (extent.rows, extent.columns)
         certainty = np.frombuffer(message.certainty, np.uint8).reshape(shape) if message.certainty else None
         classes = np.frombuffer(message.class_ids, np.uint8).reshape(shape)
@@ -197,8 +198,9 @@ def _fault_of_values(prediction: Prediction, extent: GridExtent) -> str | None:
 def _fault_of_times(prediction: Prediction, before_ns: int) -> str | None:
     """Say what is wrong with the times of a prediction; `before_ns` is the publication of the one before it."""
     published = f"published at {prediction.publish_ns} ns"
-    if max(prediction.publish_ns, prediction.for_ns, prediction.capture_ns) >= MAX_STAMP_NS:
-        return f"{published}, for {prediction.for_ns} ns: times of 2^63 ns or more"
+    times_ns = (prediction.publish_ns, prediction.for_ns, prediction.capture_ns)
+    if not 0 <= min(times_ns) <= max(times_ns) < MAX_STAMP_NS:
+        return f"{published}, for {prediction.for_ns} ns: times below 0, or times of 2^63 ns or more"
     if prediction.publish_ns < prediction.capture_ns:
         return f"{published}, before the capture of its newest input at {prediction.capture_ns} ns"
     if prediction.publish_ns < before_ns:

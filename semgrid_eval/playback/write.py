@@ -15,6 +15,8 @@ from semgrid_eval.files import atomic_file, write_text
 from semgrid_eval.log import topics
 from semgrid_eval.log.codec import transforms_message
 from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, GridPlace, exact_message, viewer_message
+from semgrid_eval.log.predictions import RECORD as PREDICTIONS_RECORD
+from semgrid_eval.log.predictions import RECORDING, Prediction, prediction_message
 from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.playback.backdrop import Backdrop, Outgoing, prediction_topic, viewer_layout
 from semgrid_eval.playback.place import LAYOUT, RECORD, digest_of, require_place
@@ -86,6 +88,8 @@ def write_playback(
             shifts_ns[name], end_ns = shift_ns, played.last_ns + shift_ns
             progress(done, len(chosen), name)
         made = {"run": record.title, "row": row_name, "result": scored.record.id, LAYOUT: digest_of(text.encode())}
+        if len(chosen) == 1:  # times of others are shifted
+            writer.metadata(PREDICTIONS_RECORD, {RECORDING: chosen[0]})
         dumped = {"seed": json.dumps(scored.record.seed), "shift_ns": json.dumps(shifts_ns)}
         writer.metadata(RECORD, made | dumped)
         write_text(layout, text)
@@ -137,6 +141,9 @@ class _Messages:
                 yield Outgoing(now_ns, topic, message, publish_ns, notes)
                 if layer.names:
                     exact = exact_message(now_ns, values, layer, place)
+                    if topic == prediction_topic(self._scored.row.name):
+                        certainty = self._scored.arrays["certainty"][index]
+                        exact = prediction_message(Prediction(values, now_ns, publish_ns, publish_ns, certainty), place)
                     yield Outgoing(now_ns, f"{topic}/exact", exact, publish_ns, notes)
 
     def _layers(

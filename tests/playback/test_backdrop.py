@@ -121,6 +121,6 @@ def test_a_camera_that_is_not_there_is_named(log, camera, name):
 def test_a_picture_without_its_data_is_damage(log, monkeypatch):
     broken = CompressedImage(data=b"no picture").SerializeToString()
     backdrop = Backdrop(log, grid_of("front"))
-    monkeypatch.setattr(log, "messages", lambda names: iter([("/camera/front/image", START_NS, broken)]))
+    monkeypatch.setattr(log, "messages", lambda names: iter([("/camera/front/image", START_NS, broken, START_NS)]))
     with pytest.raises(LogError, match=r"log.mcap: /camera/front/image: "):
         sent(backdrop, 0, 5)
