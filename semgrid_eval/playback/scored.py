@@ -20,7 +20,10 @@ _LISTED_NAMES = 10
 
 @dataclass(frozen=True)
 class Scored:
-    """A row's windows with one seed: inputs (N, S, T, H, W); target, mask, prediction and certainty (N, H, W)."""
+    """A row's windows with one seed: inputs (N, S, T, H, W); target, mask, prediction and certainty (N, H, W).
+
+    Of a stream, `arrays` are those of the one recording that it keeps, as `results.read_stream` has them.
+    """
 
     row: results.RowRecord
     record: results.ResultRecord
@@ -35,6 +38,11 @@ class Scored:
         for i in sorted(range(len(windows)), key=lambda i: windows[i].target_stamp_ns):
             found[windows[i].recording].append(i)
         return found
+
+    @property
+    def kept(self) -> list[str]:
+        """Names of the recordings of which grids are kept, in the order of their first windows."""
+        return [self.record.windows[0].recording] if self.record.stream else list(self.windows_of)
 
 
 def find_row(record: results.RunRecord, name: str, run: Path) -> results.RowRecord:
@@ -51,15 +59,12 @@ def read_scored(run: Path, row: results.RowRecord) -> Scored:
     """Read the first of a row's results that kept its predictions.
 
     Raises:
-        InputError: none did.
+        InputError: none did, or the row is a stream.
         ResultError: what was kept is damaged.
     """
-    folders = [results.result_folder(run, result_id) for result_id in row.results]
-    folder = next((folder for folder in folders if (folder / results.PREDICTIONS_FILE).is_file()), None)
-    if folder is None:
-        raise InputError("none of its results kept its predictions", path=run, field=f"row {row.name}")
-    record = results.read_result(folder)
-    grid = parse_config(GridConfig, record.config.get("grid"), path=folder / "result.json")
+    if row.facts.stream is not None:
+        raise InputError("is a stream and has no windows; `play --stream` shows it", path=run, field=f"row {row.name}")
+    record, grid, folder = _first_with(results.PREDICTIONS_FILE, run, row)
     arrays = results.read_predictions(folder) | results.read_windows(run, record.windows_id)
     flat = (len(record.windows), grid.spec.rows, grid.spec.columns)
     for name, array in arrays.items():
@@ -69,15 +74,43 @@ def read_scored(run: Path, row: results.RowRecord) -> Scored:
     return Scored(row, record, grid, {name: array.astype(np.uint8) for name, array in arrays.items()})
 
 
+def read_streamed(run: Path, row: results.RowRecord) -> Scored:
+    """Read what the first of a stream's results that kept some grids has kept.
+
+    Raises:
+        InputError: none did, or the row is not a stream.
+        ResultError: what was kept is damaged.
+    """
+    if row.facts.stream is None:
+        raise InputError("is scored window by window and has no stream to play", path=run, field=f"row {row.name}")
+    record, grid, folder = _first_with(results.STREAM_FILE, run, row)
+    arrays = results.read_stream(folder)
+    size = (grid.spec.rows, grid.spec.columns)
+    for name in ("prediction", "certainty", "target", "mask"):
+        if arrays[name].shape[1:] != size:
+            raise ResultError(f"has shape {arrays[name].shape}, not {size}", path=folder, field=name)
+    return Scored(row, record, grid, arrays)
+
+
+def _first_with(file: str, run: Path, row: results.RowRecord) -> tuple[results.ResultRecord, GridConfig, Path]:
+    folders = [results.result_folder(run, result_id) for result_id in row.results]
+    folder = next((folder for folder in folders if (folder / file).is_file()), None)
+    if folder is None:
+        raise InputError("none of its results kept its predictions", path=run, field=f"row {row.name}")
+    record = results.read_result(folder)
+    return record, parse_config(GridConfig, record.config.get("grid"), path=folder / "result.json"), folder
+
+
 def choose_recordings(scored: Scored, recording: str | None, *, every_recording: bool) -> list[str]:
     """Name the recordings that are asked for, the first if none is; an InputError says that there is no such one."""
-    names = list(scored.windows_of)
+    names = scored.kept
     if every_recording:
         return names
     if recording is None:
         return names[:1]
     if recording not in names:
-        fault = f"there is no scored recording {recording!r}, only {_listed(names)}"
+        kind = "kept" if scored.record.stream else "scored"
+        fault = f"there is no {kind} recording {recording!r}, only {_listed(names)}"
         raise InputError(fault, field=f"row {scored.row.name}")
     return [recording]
 

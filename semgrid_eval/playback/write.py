@@ -10,20 +10,31 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.config import parse_config
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file, write_text
+from semgrid_eval.grids.extent import extent_of
 from semgrid_eval.log import topics
 from semgrid_eval.log.codec import transforms_message
-from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, GridPlace, exact_message, viewer_message
+from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, exact_message, viewer_message
 from semgrid_eval.log.predictions import RECORD as PREDICTIONS_RECORD
 from semgrid_eval.log.predictions import RECORDING, Prediction, prediction_message
 from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.playback.backdrop import Backdrop, Outgoing, prediction_topic, viewer_layout
+from semgrid_eval.playback.live import LiveMessages
 from semgrid_eval.playback.place import LAYOUT, RECORD, digest_of, require_place
-from semgrid_eval.playback.scored import Scored, choose_recordings, find_row, open_scored_log, read_scored
+from semgrid_eval.playback.scored import (
+    Scored,
+    choose_recordings,
+    find_row,
+    open_scored_log,
+    read_scored,
+    read_streamed,
+)
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.scores import results
+from semgrid_eval.streams.config import StreamConfig
 
 GAP_NS = 1_000_000_000
 """Between recordings that are played one after the other: those of one town may overlap in time."""
@@ -46,6 +57,7 @@ def write_playback(
     logs: Path | None = None,
     recording: str | None = None,
     every_recording: bool = False,
+    live: bool = False,
     force: bool = False,
     progress: Progress = silent,
 ) -> Playback:
@@ -60,6 +72,7 @@ def write_playback(
         logs: folder of the run's logs; with it come pictures, calibration and the vehicle's way.
         recording: the one to play; the first if not given.
         every_recording: play all of them one after the other, later ones shifted in time.
+        live: play the recording that a stream keeps as a viewer would have seen it, see `playback.live`.
         force: replace `out` and the layout beside it, whatever they are; else only an earlier log of this kind.
         progress: told of each recording.
 
@@ -70,7 +83,7 @@ def write_playback(
     if logs is not None and out.resolve().is_relative_to(logs.resolve()):
         raise InputError("lies in the folder of logs, where it would be taken for one", path=out)
     record = results.read_run(run)
-    scored = read_scored(run, find_row(record, row_name, run))
+    scored = (read_streamed if live else read_scored)(run, find_row(record, row_name, run))
     chosen = choose_recordings(scored, recording, every_recording=every_recording)
     layout, text = out.with_suffix(".layout.json"), _layout_text(record, scored, chosen[-1], logs)
     require_place(out, layout, text, (log.path for log in record.logs), force=force)
@@ -81,7 +94,7 @@ def write_playback(
             with ExitStack() as stack:
                 log = open_scored_log(record, scored, name, logs, stack) if logs is not None else None
                 backdrop = Backdrop(log, scored.grid) if log is not None else None
-                played = _Messages(scored, name, backdrop)
+                played = _live(scored, backdrop) if live else _Messages(scored, name, backdrop)
                 shift_ns = 0 if end_ns is None else end_ns + GAP_NS - played.first_ns
                 for sent in played.messages(shift_ns):
                     writer.write(**sent._asdict())
@@ -94,6 +107,10 @@ def write_playback(
         writer.metadata(RECORD, made | dumped)
         write_text(layout, text)
     return Playback(out, layout, tuple(chosen))
+
+
+def _live(scored: Scored, backdrop: Backdrop | None) -> LiveMessages:
+    return LiveMessages(scored, parse_config(StreamConfig, scored.record.config.get("stream")), backdrop)
 
 
 def _layout_text(record: results.RunRecord, scored: Scored, name: str, logs: Path | None) -> str:
@@ -132,8 +149,7 @@ class _Messages:
         yield from self._backdrop.messages(self.first_ns, self.last_ns, shift_ns=shift_ns, grid_yaw_rad=yaw_rad)
 
     def _grids(self, shift_ns: int) -> Iterator[Outgoing]:
-        spec, notes = self._scored.grid.spec, {"row": self._scored.row.name}
-        place = GridPlace(spec.cell_m, spec.agent_row * spec.cell_m, spec.agent_column * spec.cell_m)
+        place, notes = extent_of(self._scored.grid.spec).place, {"row": self._scored.row.name}
         for index, window in zip(self._indices, self._windows, strict=True):
             for topic, values, layer, known_ns in self._layers(index, window):
                 now_ns, publish_ns = window.target_stamp_ns + shift_ns, known_ns + shift_ns

@@ -149,7 +149,7 @@ class Worker:
                 mask_mode=row.mask_mode,
                 progress=progress,
             )
-        return Evaluation(found.sums, nothing, nothing, found.seconds)
+        return Evaluation(found.sums, nothing, nothing, found.seconds, stream=found.shown)
 
     def is_done(self, job: Job) -> bool:
         """Tell whether all that a job leaves lies in the run's folder."""
@@ -172,7 +172,7 @@ class Worker:
         return results.fault_of(folder, with_predictions=self._shows(job), with_history=with_history)
 
     def _shows(self, job: Job) -> bool:
-        return job.stream is None and job.seed in (None, self.example_seed)
+        return job.seed in (None, self.example_seed)
 
     def _history(self, job: Job) -> Path | None:
         is_network = issubclass(job.resolved.model, Network)
@@ -285,7 +285,8 @@ def _keep_result(
             results.write_sums(partial, evaluation.expected_sums, record.id, results.EXPECTED_FILE)
         if with_predictions:
             arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
-            write_arrays(partial / results.PREDICTIONS_FILE, arrays, owner=record.id)
+            file = results.STREAM_FILE if evaluation.stream else results.PREDICTIONS_FILE
+            write_arrays(partial / file, evaluation.stream or arrays, owner=record.id)
         if history:
             write_history(partial / results.HISTORY_FILE, read_history(history), owner=record.id)
         results.write_result(partial, record)
