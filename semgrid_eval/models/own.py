@@ -67,7 +67,10 @@ class _Guarded(Model):
     @classmethod
     def answers_in(cls, settings: Any) -> AnswersIn | None:  # noqa: ANN401 - of the class `Settings`
         with cls._guard():
-            return super().answers_in(settings)
+            found = super().answers_in(settings)
+        if found is not None and not isinstance(found, AnswersIn):
+            raise InputError(f"gave a {type(found).__name__} where `AnswersIn` is needed", field=cls._own_name)
+        return found
 
     @classmethod
     @contextmanager

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -180,9 +181,10 @@ def _numbers_of(logs: PredictionLogs, windows: WindowSet) -> NDArray[np.int64]:
     data, owners = windows.data, _owners(windows)
     newest_ns = data.stamps_ns[windows.inputs[:, -1].cpu().numpy()]
     target_ns = data.stamps_ns[windows.target_frames.cpu().numpy()]
+    times = cache(partial(recorded_times, logs, data, 0))
     numbers, missing = np.zeros(len(owners), np.int64), list[int]()
     for place, (name, by_ns, for_ns) in enumerate(zip(owners, newest_ns, target_ns, strict=True)):
-        found = recorded_times(logs, data, 0, name)
+        found = times(name)
         fitting = np.flatnonzero(
             (np.abs(found.for_ns - for_ns) <= period_ns(_stamps_ns(data, name)) // 2) & (found.capture_ns <= by_ns)
         )

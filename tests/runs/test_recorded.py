@@ -230,7 +230,7 @@ def test_outside_a_run_there_are_no_answers(logs):
 
 
 def test_exports_refuse_what_they_cannot_write(exported, tmp_path):
-    with pytest.raises(InputError, match="row stream: none of its results kept its predictions"):
+    with pytest.raises(InputError, match="row stream: is a stream and has no windows"):
         export_predictions(exported / "made", "stream", tmp_path / "out")
     with pytest.raises(InputError, match="plain: exists and is not an empty folder"):
         export_predictions(exported / "made", "table", exported / "plain")
