@@ -27,6 +27,8 @@ from semgrid_eval.windows.grids import GridData
 Grids = NDArray[np.uint8]
 _LIMIT_BYTES = 8 << 30  # of the grids of one log in memory
 _CERTAIN = 255
+_LONGEST_LEAD_NS = 60_000_000_000
+_LATEST_NS = 1 << 62  # so that a delay can be added
 
 
 class PredictionLogs:
@@ -156,17 +158,16 @@ def recorded_times(logs: PredictionLogs, data: GridData, added_ns: int, recordin
     """
     found, stamps_ns = logs.times(recording), _stamps_ns(data, recording)
     _require_covered(found, stamps_ns, logs.path(recording))
-    return found._replace(publish_ns=found.publish_ns + added_ns)
+    return found._replace(publish_ns=np.minimum(found.publish_ns, _LATEST_NS) + added_ns)
 
 
 def _require_covered(found: Recorded, stamps_ns: Times, path: Path) -> None:
-    """Refuse predictions from other times than the recording's; what is for times after its end was made in it."""
+    """Refuse predictions from other times than the recording's; for a minute after its end, they were made in it."""
     first_ns, last_ns = int(stamps_ns[0]), int(stamps_ns[-1])
     near_ns = period_ns(stamps_ns) // 2
-    for name, times_ns, until_ns in (("capture_time", found.capture_ns, last_ns), ("timestamp", found.for_ns, None)):
-        outside = times_ns < first_ns - near_ns
-        if until_ns is not None:
-            outside |= times_ns > until_ns + near_ns
+    until_ns = {"capture_time": last_ns + near_ns, "timestamp": last_ns + _LONGEST_LEAD_NS}
+    for name, times_ns in (("capture_time", found.capture_ns), ("timestamp", found.for_ns)):
+        outside = (times_ns < first_ns - near_ns) | (times_ns > until_ns[name])
         if outside.any():
             reach = f"the recording goes from {first_ns} to {last_ns} ns"
             raise LogError(f"{times_ns[outside.argmax()]} ns, where no truth is: {reach}", path=path, field=name)

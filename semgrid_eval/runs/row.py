@@ -200,15 +200,22 @@ class Row(Config):
         horizon = self.scored_window.horizon_steps
         parts = [
             found.in_words(found.parse_settings(self.settings)) if found else self.model,
-            "moved to the target's time" if self.translate else "not moved",
-            f"{self.window.inputs} inputs",
+            *self._inputs_in_words,
             f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead",
         ]
         if self.disturb:
             parts.append(self.disturb.words)
         if self.stream:
-            parts[1:] = [f"{self.window.inputs} inputs", self.stream.words]
+            parts[1:] = [*self._inputs_in_words[1:], self.stream.words]
         return f"{self.name} ({', '.join(parts)})"
+
+    @property
+    def _inputs_in_words(self) -> list[str]:
+        """Say what its model is given; of answers that were made elsewhere, nothing is known."""
+        if self.answers_in is not None:
+            return []
+        moved = "moved to the target's time" if self.translate else "not moved"
+        return [moved, f"{self.window.inputs} inputs"]
 
 
 class Unit(NamedTuple):

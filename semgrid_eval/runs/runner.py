@@ -135,7 +135,8 @@ def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[Windo
     for row in rows:
         with suppress(SemgridError, torch.OutOfMemoryError):  # its units will tell
             windows = worker.scored_windows(row)[0]
-            yield (windows if row.stream is None else first_of_each(windows)), row.grid
+            if len(windows):  # answers of a stream may all come too late
+                yield (windows if row.stream is None else first_of_each(windows)), row.grid
 
 
 def _questions(worker: Worker, rows: Iterable[Row], first_seed: int) -> Iterator[Question]:

@@ -240,7 +240,7 @@ class Worker:
             id=job.result_id,
             facts=job.row.facts,
             targets=target_key(job),
-            lead_s=round(float(job.scored.lead_s[:, -1].median()), 6),
+            lead_s=round(float(job.scored.lead_s[:, -1].median()), 6) if len(job.scored) else 0.0,
             stream=stream_record(job.stream) if job.stream else None,
             config=job.config,
             log_digests=tuple(sorted(set(job.scored.data.digests))),

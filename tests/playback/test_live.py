@@ -29,6 +29,7 @@ ROWS = {
     "moved": STREAM,
     "still": {**STREAM, "move": False},
     "exact": {"latency_ms": LATE_NS / 1e6, "asked": "exact", "rate_hz": 10.0},
+    "late": {"latency_ms": 60_000},
     "plain": None,
 }
 TOPIC = "/grid/prediction/moved"
@@ -51,7 +52,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def play(made):
-    for name in ("moved", "still", "exact"):
+    for name in ("moved", "still", "exact", "late"):
         write_playback(made / "run", name, made / f"{name}.mcap", logs=made / "logs", live=True)
     return lambda name, topic: messages(made / f"{name}.mcap", topic)
 
@@ -147,6 +148,11 @@ def test_an_answer_for_one_time_of_evaluation_is_there_at_that_time_alone(play):
     times = [log_ns for log_ns, _, _ in play("exact", "/grid/prediction/exact")]
     assert times == [log_ns for log_ns, _, _ in play("exact", "/grid/prediction/exact/exact")]
     assert times == [log_ns for log_ns, _, _ in play("exact", "/grid/target")][1:]
+
+
+def test_of_answers_that_come_after_the_end_nothing_is_drawn(play):
+    assert len(play("late", "/grid/target")) == FRAMES
+    assert play("late", "/grid/prediction/late") == play("late", "/grid/certainty") == []
 
 
 @pytest.mark.parametrize(

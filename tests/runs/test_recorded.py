@@ -184,6 +184,7 @@ def test_missing_times_and_logs_are_named(exported, logs, tmp_path):
         ({"capture_ns": at(-1)}, "capture_time"),
         ({"capture_ns": at(9)}, "capture_time"),
         ({"capture_ns": at(2), "for_ns": at(-1)}, "timestamp"),
+        ({"capture_ns": at(2), "for_ns": at(8) + 60_000_000_001}, "timestamp"),
     ],
 )
 @pytest.mark.parametrize("stream", [None, {"recorded": True}])
@@ -221,6 +222,21 @@ def test_another_grid_is_refused(exported, logs, tmp_path):
 def test_what_a_row_cannot_mean_is_refused_before_anything_is_read(row, fault):
     with pytest.raises(ConfigError, match=fault):
         parse_config(Row, {**logged("x"), **row}, path="row")
+
+
+def test_what_is_published_long_after_is_never_there_however_much_is_added(logs, tmp_path):
+    late = prediction(1, capture_ns=at(2), publish_ns=(1 << 63) - 1)
+    row = logged(write_all(tmp_path / "made", [late]), stream={"recorded": True, "added_ms": 60_000})
+    run([row], logs, tmp_path / "out", window=ALL)
+    assert record_of(tmp_path / "out", "logged").stream.misses == 2 * 9
+
+
+def test_labels_say_where_answers_are_from_and_nothing_of_inputs():
+    rows = [parse_config(Row, logged("x", stream=stream), path="row") for stream in (None, {"recorded": True})]
+    assert [row.label for row in rows] == [
+        "logged (predictions of x, 1 step of 5 frames ahead)",
+        "logged (predictions of x, published as recorded, moved along with the vehicle)",
+    ]
 
 
 def test_outside_a_run_there_are_no_answers(logs):
