@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from semgrid_eval.grids.recording import GridRecording as GridRecording
     from semgrid_eval.grids.spec import GridConfig as GridConfig
     from semgrid_eval.grids.spec import GridSpec as GridSpec
+    from semgrid_eval.log.predictions import Prediction as Prediction
     from semgrid_eval.models.model import Baseline as Baseline
     from semgrid_eval.models.model import Given as Given
     from semgrid_eval.models.model import Model as Model
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from semgrid_eval.models.network import Network as Network
     from semgrid_eval.models.network import NetworkSettings as NetworkSettings
     from semgrid_eval.models.network import input_planes as input_planes
+    from semgrid_eval.playback.export import export_predictions as export_predictions
+    from semgrid_eval.playback.export import write_predictions as write_predictions
     from semgrid_eval.scores.evaluate import Evaluation as Evaluation
     from semgrid_eval.scores.evaluate import evaluate as evaluate
     from semgrid_eval.scores.tidy import tidy as tidy
@@ -49,8 +52,10 @@ _NAMES = {
     "errors": "SemgridError",
     "grids.recording": "GridRecording",
     "grids.spec": "GridConfig GridSpec",
+    "log.predictions": "Prediction",
     "models.model": "Baseline Given Model one_hot",
     "models.network": "Network NetworkSettings input_planes",
+    "playback.export": "export_predictions write_predictions",
     "scores.evaluate": "Evaluation evaluate",
     "scores.tidy": "tidy",
     "windows.data": "WindowBatch WindowConfig WindowSet",

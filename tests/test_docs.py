@@ -20,7 +20,9 @@ from semgrid_eval.windows.data import WindowBatch
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-EXPERIMENTS = [(ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("remedies", "disturbances")]
+EXPERIMENTS = [
+    (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("remedies", "disturbances", "predictions")
+]
 LATENCY = (ROOT / "docs" / "latency.md").read_text(encoding="utf-8")
 
 

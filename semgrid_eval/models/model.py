@@ -1,7 +1,7 @@
 """What every model is to a run, built in or one's own: settings, what a row gives it, and its answer."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import torch
 from torch import Tensor
@@ -39,6 +39,13 @@ class Given:
     def planes(self) -> int:
         """Channels of these grids as one-hot planes, S times T times C."""
         return self.grids * CLASS_COUNT
+
+
+class AnswersIn(NamedTuple):
+    """A folder of logs that hold the answers of a model which runs elsewhere."""
+
+    folder: str
+    topic: str | None  # that holds them; where it is not given, logs tell
 
 
 class Model:
@@ -95,6 +102,11 @@ class Model:
 
         A row that is told is never the best one, and its scores are lines beside those of others.
         """
+        return None
+
+    @classmethod
+    def answers_in(cls, settings: Any) -> AnswersIn | None:  # noqa: ANN401 - of the class `Settings`
+        """Say where its answers are, if they were made elsewhere; a run then gives them in `WindowBatch.answers`."""
         return None
 
     def fit(self, windows: WindowSet) -> None:

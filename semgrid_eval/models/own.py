@@ -12,7 +12,7 @@ from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.models.beside import ModelFile
 from semgrid_eval.models.device import is_out_of_memory
-from semgrid_eval.models.model import Given, Model, require_answer
+from semgrid_eval.models.model import AnswersIn, Given, Model, require_answer
 from semgrid_eval.models.network import Network, NetworkSettings
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
@@ -71,6 +71,14 @@ class _Guarded(Model):
     def asks(cls, settings: Any, given: Given) -> "Truth | None":  # noqa: ANN401 - of the class `Settings`
         with cls._guard():
             return super().asks(settings, given)
+
+    @classmethod
+    def answers_in(cls, settings: Any) -> AnswersIn | None:  # noqa: ANN401 - of the class `Settings`
+        with cls._guard():
+            found = super().answers_in(settings)
+        if found is not None and not isinstance(found, AnswersIn):
+            raise InputError(f"gave a {type(found).__name__} where `AnswersIn` is needed", field=cls._own_name)
+        return found
 
     @classmethod
     @contextmanager

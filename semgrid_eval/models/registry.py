@@ -29,6 +29,7 @@ MODELS = {
     "true_motion": f"{_HERE}.true_motion:FuseTrueMotion",
     "fresh": f"{_HERE}.fresh:FreshErrors",
     "ceiling": f"{_HERE}.ceiling:Ceiling",
+    "log": f"{_HERE}.recorded:Recorded",
 }
 """Where the class of each built-in model lies; a new model is its module, its test and a line here."""
 _loaded: dict[str, tuple[ModelFile, type[Model]]] = {}

@@ -110,6 +110,9 @@ def viewer_layout(row: RowRecord, cameras: Sequence[str]) -> dict[str, Any]:
     shown = layout["configById"]["3D!input"]["topics"]
     settings = shown.pop(f"{GRID_INPUT}/{{sensor}}")
     shown.update({f"{GRID_INPUT}/{sensor}": settings for sensor in row.facts.sensors})
+    if row.facts.stream is not None:  # its inputs are not kept
+        del layout["configById"]["3D!input"]
+        layout["layout"]["second"]["first"] = "3D!certainty"
     if not cameras:
         panels = layout["configById"]
         layout["configById"] = {name: panels[name] for name in panels if not name.startswith("Image!")}

@@ -2,34 +2,42 @@
 
 import heapq
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.config import parse_config
-from semgrid_eval.errors import InputError, LogError, ResultError
+from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file, write_text
-from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.grids.extent import extent_of
 from semgrid_eval.log import topics
 from semgrid_eval.log.codec import transforms_message
-from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, GridPlace, exact_message, viewer_message
-from semgrid_eval.log.reader import LogReader
+from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK, GridLayer, exact_message, viewer_message
+from semgrid_eval.log.predictions import RECORD as PREDICTIONS_RECORD
+from semgrid_eval.log.predictions import RECORDING, Prediction, prediction_message
 from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.playback.backdrop import Backdrop, Outgoing, prediction_topic, viewer_layout
+from semgrid_eval.playback.live import LiveMessages
 from semgrid_eval.playback.place import LAYOUT, RECORD, digest_of, require_place
+from semgrid_eval.playback.scored import (
+    Scored,
+    choose_recordings,
+    find_row,
+    open_scored_log,
+    read_scored,
+    read_streamed,
+)
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.scores import results
+from semgrid_eval.streams.config import StreamConfig
 
 GAP_NS = 1_000_000_000
 """Between recordings that are played one after the other: those of one town may overlap in time."""
-
-_LISTED_NAMES = 10
 
 
 @dataclass(frozen=True)
@@ -49,6 +57,7 @@ def write_playback(
     logs: Path | None = None,
     recording: str | None = None,
     every_recording: bool = False,
+    live: bool = False,
     force: bool = False,
     progress: Progress = silent,
 ) -> Playback:
@@ -63,6 +72,7 @@ def write_playback(
         logs: folder of the run's logs; with it come pictures, calibration and the vehicle's way.
         recording: the one to play; the first if not given.
         every_recording: play all of them one after the other, later ones shifted in time.
+        live: play the recording that a stream keeps as a viewer would have seen it, see `playback.live`.
         force: replace `out` and the layout beside it, whatever they are; else only an earlier log of this kind.
         progress: told of each recording.
 
@@ -73,8 +83,8 @@ def write_playback(
     if logs is not None and out.resolve().is_relative_to(logs.resolve()):
         raise InputError("lies in the folder of logs, where it would be taken for one", path=out)
     record = results.read_run(run)
-    scored = _read_scored(run, _row(record, row_name, run))
-    chosen = _choose(scored, recording, every_recording=every_recording)
+    scored = (read_streamed if live else read_scored)(run, find_row(record, row_name, run))
+    chosen = choose_recordings(scored, recording, every_recording=every_recording)
     layout, text = out.with_suffix(".layout.json"), _layout_text(record, scored, chosen[-1], logs)
     require_place(out, layout, text, (log.path for log in record.logs), force=force)
     shifts_ns: dict[str, int] = {}  # what was added to each recording's times
@@ -82,106 +92,40 @@ def write_playback(
         end_ns = None
         for done, name in enumerate(chosen, start=1):
             with ExitStack() as stack:
-                log = _open_log(record, scored, name, logs, stack) if logs is not None else None
+                log = open_scored_log(record, scored, name, logs, stack) if logs is not None else None
                 backdrop = Backdrop(log, scored.grid) if log is not None else None
-                played = _Messages(scored, name, backdrop)
+                played = _live(scored, backdrop) if live else _Messages(scored, name, backdrop)
                 shift_ns = 0 if end_ns is None else end_ns + GAP_NS - played.first_ns
                 for sent in played.messages(shift_ns):
                     writer.write(**sent._asdict())
             shifts_ns[name], end_ns = shift_ns, played.last_ns + shift_ns
             progress(done, len(chosen), name)
         made = {"run": record.title, "row": row_name, "result": scored.record.id, LAYOUT: digest_of(text.encode())}
+        if len(chosen) == 1:  # times of others are shifted
+            writer.metadata(PREDICTIONS_RECORD, {RECORDING: chosen[0]})
         dumped = {"seed": json.dumps(scored.record.seed), "shift_ns": json.dumps(shifts_ns)}
         writer.metadata(RECORD, made | dumped)
         write_text(layout, text)
     return Playback(out, layout, tuple(chosen))
 
 
-def _layout_text(record: results.RunRecord, scored: "_Scored", name: str, logs: Path | None) -> str:
+def _live(scored: Scored, backdrop: Backdrop | None) -> LiveMessages:
+    return LiveMessages(scored, parse_config(StreamConfig, scored.record.config.get("stream")), backdrop)
+
+
+def _layout_text(record: results.RunRecord, scored: Scored, name: str, logs: Path | None) -> str:
     """Write the layout for what a recording's log shows."""
     cameras: tuple[str, ...] = ()
     if logs is not None:
         with ExitStack() as stack:
-            cameras = _open_log(record, scored, name, logs, stack).scene.cameras
+            cameras = open_scored_log(record, scored, name, logs, stack).scene.cameras
     return json.dumps(viewer_layout(scored.row, cameras), indent=2, sort_keys=True, allow_nan=False) + "\n"
-
-
-@dataclass(frozen=True)
-class _Scored:
-    """A row's windows with one seed: inputs (N, S, T, H, W); target, mask, prediction and certainty (N, H, W)."""
-
-    row: results.RowRecord
-    record: results.ResultRecord
-    grid: GridConfig
-    arrays: dict[str, NDArray[np.uint8]]
-
-    @cached_property
-    def windows_of(self) -> dict[str, list[int]]:
-        """Indices of each recording's windows in the order of time; recordings in the order of their first windows."""
-        windows = self.record.windows
-        found: dict[str, list[int]] = {window.recording: [] for window in windows}
-        for i in sorted(range(len(windows)), key=lambda i: windows[i].target_stamp_ns):
-            found[windows[i].recording].append(i)
-        return found
-
-
-def _row(record: results.RunRecord, name: str, run: Path) -> results.RowRecord:
-    row = next((row for row in record.rows if row.name == name), None)
-    if row is None:
-        raise InputError(f"there is no row {name!r}, only {_listed([row.name for row in record.rows])}", path=run)
-    if not row.results:
-        raise InputError(f"it has no result: {row.failure or results.NOT_RUN}", path=run, field=f"row {name}")
-    return row
-
-
-def _read_scored(run: Path, row: results.RowRecord) -> _Scored:
-    folders = [results.result_folder(run, result_id) for result_id in row.results]
-    folder = next((folder for folder in folders if (folder / results.PREDICTIONS_FILE).is_file()), None)
-    if folder is None:
-        raise InputError("none of its results kept its predictions", path=run, field=f"row {row.name}")
-    record = results.read_result(folder)
-    grid = parse_config(GridConfig, record.config.get("grid"), path=folder / "result.json")
-    arrays = results.read_predictions(folder) | results.read_windows(run, record.windows_id)
-    flat = (len(record.windows), grid.spec.rows, grid.spec.columns)
-    for name, array in arrays.items():
-        expected = (flat[0], len(row.facts.sensors), row.facts.inputs, *flat[1:]) if name == "inputs" else flat
-        if array.shape != expected:
-            raise ResultError(f"has shape {array.shape}, not {expected}", path=folder, field=name)
-    return _Scored(row, record, grid, {name: array.astype(np.uint8) for name, array in arrays.items()})
-
-
-def _choose(scored: _Scored, recording: str | None, *, every_recording: bool) -> list[str]:
-    names = list(scored.windows_of)
-    if every_recording:
-        return names
-    if recording is None:
-        return names[:1]
-    if recording not in names:
-        fault = f"there is no scored recording {recording!r}, only {_listed(names)}"
-        raise InputError(fault, field=f"row {scored.row.name}")
-    return [recording]
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = len(names) - _LISTED_NAMES
-    return ", ".join(names[:_LISTED_NAMES]) + (f" and {more} more" if more > 0 else "")
-
-
-def _open_log(record: results.RunRecord, scored: _Scored, name: str, logs: Path, stack: ExitStack) -> LogReader:
-    if not logs.is_dir():
-        raise InputError("is not a folder", path=logs)
-    path = scored.record.windows[scored.windows_of[name][0]].log
-    log = stack.enter_context(LogReader(logs / path))
-    known = results.scored_digest(record, scored.record, path)
-    if log.digest not in (scored.record.log_digests if known is None else (known,)):
-        raise LogError(f"has digest {log.digest}, and the log that was scored had {known or 'another'}", path=log.path)
-    return log
 
 
 class _Messages:
     """The messages of one recording; a LogError says that the log lacks the frame of a target."""
 
-    def __init__(self, scored: _Scored, name: str, backdrop: Backdrop | None) -> None:
+    def __init__(self, scored: Scored, name: str, backdrop: Backdrop | None) -> None:
         self._scored, self._backdrop = scored, backdrop
         self._indices = scored.windows_of[name]
         self._windows = [scored.record.windows[i] for i in self._indices]
@@ -205,8 +149,7 @@ class _Messages:
         yield from self._backdrop.messages(self.first_ns, self.last_ns, shift_ns=shift_ns, grid_yaw_rad=yaw_rad)
 
     def _grids(self, shift_ns: int) -> Iterator[Outgoing]:
-        spec, notes = self._scored.grid.spec, {"row": self._scored.row.name}
-        place = GridPlace(spec.cell_m, spec.agent_row * spec.cell_m, spec.agent_column * spec.cell_m)
+        place, notes = extent_of(self._scored.grid.spec).place, {"row": self._scored.row.name}
         for index, window in zip(self._indices, self._windows, strict=True):
             for topic, values, layer, known_ns in self._layers(index, window):
                 now_ns, publish_ns = window.target_stamp_ns + shift_ns, known_ns + shift_ns
@@ -214,6 +157,9 @@ class _Messages:
                 yield Outgoing(now_ns, topic, message, publish_ns, notes)
                 if layer.names:
                     exact = exact_message(now_ns, values, layer, place)
+                    if topic == prediction_topic(self._scored.row.name):
+                        certainty = self._scored.arrays["certainty"][index]
+                        exact = prediction_message(Prediction(values, now_ns, publish_ns, publish_ns, certainty), place)
                     yield Outgoing(now_ns, f"{topic}/exact", exact, publish_ns, notes)
 
     def _layers(

@@ -11,7 +11,7 @@ from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import Truth
-from semgrid_eval.models.model import Given, Model
+from semgrid_eval.models.model import AnswersIn, Given, Model
 from semgrid_eval.models.registry import MODELS, described, installed_models, is_named
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.facts import RowFacts, StreamFacts
@@ -102,11 +102,15 @@ class Row(Config):
             return
         if self.asked is not None:
             raise ValueError("disturb: a row that is told of the truth has no inputs to disturb")
+        if self.answers_in is not None:
+            raise ValueError("disturb: answers that were made elsewhere have no inputs to disturb")
         self.disturb.check(self.window.inputs)
 
     def _check_stream(self) -> None:
         if self.stream is None:
             return
+        if self.stream.recorded != (self.answers_in is not None):
+            raise ValueError("stream.recorded: true where answers and their times lie in logs, and there alone")
         if self.disturb is not None or self.second_target is not None:
             raise ValueError("stream: a stream has neither disturbed inputs nor a second target")
         if self.asked is not None and self.stream.asked != "exact":
@@ -156,6 +160,12 @@ class Row(Config):
         return found.asks(found.parse_settings(self.settings), self.given) if found else None
 
     @property
+    def answers_in(self) -> AnswersIn | None:
+        """Where its answers are, if they were made elsewhere."""
+        found = self.found_model()
+        return found.answers_in(found.parse_settings(self.settings)) if found else None
+
+    @property
     def facts(self) -> RowFacts:
         """What the row is, whatever it is called."""
         found = self.found_model()
@@ -182,8 +192,8 @@ class Row(Config):
             return None
         words = self.stream.model_copy(update={"added_ms": 0.0}).words
         stream = self.stream
-        measured = stream.latency_ms is None
-        return StreamFacts(words=words, added_ms=stream.added_ms, measured=measured, asked=stream.asked)
+        asked, measured = "recorded" if stream.recorded else stream.asked, stream.latency_ms is None
+        return StreamFacts(words=words, added_ms=stream.added_ms, measured=measured, asked=asked)
 
     @property
     def label(self) -> str:
@@ -192,8 +202,7 @@ class Row(Config):
         horizon, lead_ms = self.scored_window.horizon_steps, self.scored_window.lead_ms
         parts = [
             found.in_words(found.parse_settings(self.settings)) if found else self.model,
-            "moved to the target's time" if self.translate else "not moved",
-            f"{self.window.inputs} inputs",
+            *self._inputs_in_words,
             f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead"
             if lead_ms is None
             else f"{lead_ms:g} ms ahead",
@@ -201,8 +210,16 @@ class Row(Config):
         if self.disturb:
             parts.append(self.disturb.words)
         if self.stream:
-            parts[1:] = [f"{self.window.inputs} inputs", self.stream.words]
+            parts[1:] = [*self._inputs_in_words[1:], self.stream.words]
         return f"{self.name} ({', '.join(parts)})"
+
+    @property
+    def _inputs_in_words(self) -> list[str]:
+        """Say what its model is given; of answers that were made elsewhere, nothing is known."""
+        if self.answers_in is not None:
+            return []
+        moved = "moved to the target's time" if self.translate else "not moved"
+        return [moved, f"{self.window.inputs} inputs"]
 
 
 class Unit(NamedTuple):

@@ -23,11 +23,12 @@ from semgrid_eval.runs.matrix import Matrix
 from semgrid_eval.runs.packed import PackedGrids, is_packed
 from semgrid_eval.runs.record import Clock, Outcome, run_record
 from semgrid_eval.runs.row import Row, Unit, plan_units, units_of
+from semgrid_eval.runs.selection import first_of_each
 from semgrid_eval.runs.thumbnails import keep_pictures
 from semgrid_eval.runs.truth import work_out
 from semgrid_eval.runs.worker import Worker, asks_of_truth
 from semgrid_eval.scores import results
-from semgrid_eval.windows.data import WindowSet, first_of_each
+from semgrid_eval.windows.data import WindowSet
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,8 @@ def _scored_windows(worker: Worker, rows: Iterable[Row]) -> Iterator[tuple[Windo
     for row in rows:
         with suppress(SemgridError, torch.OutOfMemoryError):  # its units will tell
             windows = worker.scored_windows(row)[0]
-            yield (windows if row.stream is None else first_of_each(windows)), row.grid
+            if len(windows):  # answers of a stream may all come too late
+                yield (windows if row.stream is None else first_of_each(windows)), row.grid
 
 
 def _questions(worker: Worker, rows: Iterable[Row], first_seed: int) -> Iterator[Question]:

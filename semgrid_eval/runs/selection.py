@@ -1,7 +1,9 @@
 """Which windows of which recordings a row trains on and is scored on, selected once for all rows that share them."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.runs.data import GridSource, grid_digest
@@ -65,3 +67,11 @@ class Selection:
             too_short = {index: why for index, why in planned.too_short.items() if index in kept}
             self._selected[key] = windows, too_short
         return self._selected[key]
+
+
+def first_of_each(windows: WindowSet) -> WindowSet:
+    """Return the first window of each recording."""
+    owners, _ = windows.data.locate(windows.target_frames.cpu().numpy())
+    chosen = np.unique(owners, return_index=True)[1]
+    parts = ("inputs", "target_frames", "shift_cells", "lead_s")
+    return replace(windows, truth=None, answers=None, **{name: getattr(windows, name)[chosen] for name in parts})

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_files
+from semgrid_eval.runs.recorded import PredictionLogs, recorded_times
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.facts import StreamRecord
 from semgrid_eval.scores.results import WindowRecord
@@ -23,8 +24,8 @@ Floats = NDArray[np.float64]
 _MS = 1_000_000
 
 
-def plan_row(row: Row, data: GridData, recordings: Sequence[int]) -> StreamPlan:
-    """Plan the stream of a row.
+def plan_row(row: Row, data: GridData, recordings: Sequence[int], logs: PredictionLogs | None = None) -> StreamPlan:
+    """Plan the stream of a row; `logs` are those with its answers, where it has some.
 
     Raises:
         InputError: the profile cannot be read or lacks the model, or no recording is long enough.
@@ -39,6 +40,7 @@ def plan_row(row: Row, data: GridData, recordings: Sequence[int]) -> StreamPlan:
         sensors=row.sensors,
         translate=row.translate,
         limits_ns=_limits_ns(row, data),
+        recorded=None if logs is None else partial(recorded_times, logs, data, round(row.stream.added_ms * _MS)),
     )
 
 

@@ -27,6 +27,7 @@ from semgrid_eval.models.stand_in import make_ready
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.data import GridSource, grid_digest
 from semgrid_eval.runs.job import SCORING_VERSION, Job, Resolved, Training, id_of_windows, target_key, window_records
+from semgrid_eval.runs.recorded import RecordedRows
 from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.selection import Selection, Wanted
 from semgrid_eval.runs.stream import block_records, identity_of, plan_row, stream_record
@@ -64,6 +65,7 @@ class Worker:
     stage: Stage  # shows progress
     _windows: Selection = field(default_factory=Selection, init=False)
     _unseen: tuple[tuple[GridData, bytes], Unseen] | None = field(default=None, init=False)  # M of the last stream
+    _recorded: RecordedRows = field(default_factory=RecordedRows, init=False)
     # Ids of the windows that are known to lie in the run's folder.
     _kept: set[str] = field(default_factory=set, init=False)
 
@@ -80,7 +82,8 @@ class Worker:
         scored, left_out = (stream.answers, dict[str, str]()) if stream else self.scored_windows(row)
         windows_id = digest_value(stream.digest()) if stream else id_of_windows(row, scored)
         training = self._training(resolved, row, seed, scored) if resolved.model.learns() else None
-        config = {**row.identity(), **identity_of(row), "code": resolved.version}
+        told = identity_of(row) | self._recorded.identity(row, scored)
+        config = {**row.identity(), **told, "code": resolved.version}
         if asks_of_truth(row) and self.scored_data.cache is not None:
             config["truth"] = truth_versions()
         learned = [training and training.id, seed]
@@ -91,7 +94,7 @@ class Worker:
         """Plan the stream of a row: over all recordings that are scored, from their first frames to their last."""
         data = self.scored_data.data(row.grid, row.scored_split)
         wanted = Wanted(row.scored_split, row.scored_window, validation_windows, (), row.hold_out, held_out=True)
-        return plan_row(row, data, sorted(wanted.recordings(data.groups)))
+        return plan_row(row, data, sorted(wanted.recordings(data.groups)), self._recorded.of(row))
 
     def scored_windows(self, row: Row) -> tuple[WindowSet, dict[str, str]]:
         """Select the windows on which a row is scored, and say why some logs give none; of a stream its answers."""
@@ -131,6 +134,7 @@ class Worker:
         expected = expected_target(scored, row.grid, cache) if row.second_target else None
         if row.asked is not None:
             scored = replace(scored, truth=told(row.asked, scored, row.grid, cache))
+        scored = replace(scored, answers=self._recorded.told(row, scored, job.stream))
         if job.stream is not None:
             return self._streamed(job, model, replace(job.stream, answers=scored))
         score = partial(evaluate, model, scored, mask_mode=row.mask_mode, spec=row.grid.spec, expected=expected)
@@ -151,7 +155,7 @@ class Worker:
                 unseen=self._unseen_at(plan),
                 progress=progress,
             )
-        return Evaluation(found.sums, nothing, nothing, found.seconds)
+        return Evaluation(found.sums, nothing, nothing, found.seconds, stream=found.shown)
 
     def _unseen_at(self, plan: StreamPlan) -> Unseen:
         """Work M out for the times of evaluation of a stream, or find it as another row has left it."""
@@ -181,7 +185,7 @@ class Worker:
         return results.fault_of(folder, with_predictions=self._shows(job), with_history=with_history)
 
     def _shows(self, job: Job) -> bool:
-        return job.stream is None and job.seed in (None, self.example_seed)
+        return job.seed in (None, self.example_seed)
 
     def _history(self, job: Job) -> Path | None:
         is_network = issubclass(job.resolved.model, Network)
@@ -240,7 +244,7 @@ class Worker:
             id=job.result_id,
             facts=job.row.facts,
             targets=target_key(job),
-            lead_s=round(float(job.scored.lead_s[:, -1].median()), 6),
+            lead_s=round(float(job.scored.lead_s[:, -1].median()), 6) if len(job.scored) else 0.0,
             stream=stream_record(job.stream) if job.stream else None,
             config=job.config,
             log_digests=tuple(sorted(set(job.scored.data.digests))),
@@ -285,7 +289,8 @@ def _keep_result(
             results.write_sums(partial, evaluation.expected_sums, record.id, results.EXPECTED_FILE)
         if with_predictions:
             arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
-            write_arrays(partial / results.PREDICTIONS_FILE, arrays, owner=record.id)
+            file = results.STREAM_FILE if evaluation.stream else results.PREDICTIONS_FILE
+            write_arrays(partial / file, evaluation.stream or arrays, owner=record.id)
         if history:
             write_history(partial / results.HISTORY_FILE, read_history(history), owner=record.id)
         results.write_result(partial, record)

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -30,6 +30,7 @@ class Evaluation:
     certainty: NDArray[np.uint8]  # (N, H, W) uint8, the highest score of each cell, 255 = 1
     seconds: float  # time spent predicting, without gathering inputs
     expected_sums: Sums | None = None  # what was counted against the expected target, where there is one
+    stream: dict[str, NDArray[Any]] | None = None  # of a stream, instead of all answers, what is kept to be looked at
 
 
 def evaluate(

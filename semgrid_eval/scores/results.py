@@ -11,6 +11,11 @@ RUN/results/<id>/expected.npz  where asked for and known: the same, counted agai
                                average, the likeliest class of each cell over new errors drawn on the exact pictures
 RUN/results/<id>/history.csv   of trained models: epoch, updates, learning_rate, loss, validation_loss, seconds
 RUN/results/<id>/predictions.npz   prediction (N, H, W) uint8 class ids, certainty (N, H, W) uint8 (255 = 1.0)
+RUN/results/<id>/stream.npz    of a stream, of its first recording: the K answers that were used, prediction and
+                               certainty (K, H, W) uint8 for the vehicle's place at the time that they are for, with
+                               for_ns, capture_ns, publish_ns (K,) and its position then and at publication, answer_m
+                               and publish_m (K, 2); of the E times of evaluation evaluated_ns (E,), evaluated_m (E, 2),
+                               used (E,) the answer or -1, target and mask M (E, H, W) uint8
 RUN/windows/<id>.npz           inputs (N, S, T, H, W) uint8 aligned, target (N, H, W) uint8, mask (N, H, W) bool;
                                where a log has the truth actors (N, H, W) uint8: 1 near a standing actor, 2 near a
                                moving one, 3 near both, zeros for windows of logs without the truth
@@ -42,6 +47,9 @@ RUN_FILE, RESULT_FILE = "run.json", "result.json"
 SUMS_FILE = "sums.npz"
 EXPECTED_FILE = "expected.npz"
 PREDICTIONS_FILE = "predictions.npz"
+STREAM_FILE = "stream.npz"
+_ANSWERS = ("prediction", "certainty", "for_ns", "capture_ns", "publish_ns", "answer_m", "publish_m")
+_EVALUATIONS = ("evaluated_ns", "evaluated_m", "used", "target", "mask")
 HISTORY_FILE = "history.csv"
 _RUN = "run"  # owns the record of a run, which has no id
 NOT_RUN = "not run yet"
@@ -97,7 +105,7 @@ class ResultRecord(Config):
     train_seconds: float | None
     predict_seconds: float
     parameters: int | None
-    stream: StreamRecord | None = None  # then its windows are blocks of time, and no predictions are kept
+    stream: StreamRecord | None = None  # then its windows are blocks of time, and the first recording is kept
     has_expected: bool = False  # whether it is also scored against what is measured on average
 
 
@@ -180,7 +188,7 @@ def fault_of(folder: Path, *, with_predictions: bool = False, with_history: bool
         record = read_result(folder)
         check_sums(folder, len(record.windows), has_expected=record.has_expected)
         if with_predictions:
-            read_predictions(folder)
+            read_stream(folder) if record.stream else read_predictions(folder)
         if with_history and ((history := read_history(folder)) is None or history.empty):
             raise ResultError("is missing or empty", path=folder / HISTORY_FILE)
     except (InputError, OSError, ValueError) as error:
@@ -205,6 +213,16 @@ def read_windows(run: Path, windows_id: str) -> dict[str, NDArray[Any]]:
 def read_predictions(folder: Path) -> dict[str, NDArray[Any]]:
     """Read what a result predicted: `prediction` and `certainty`."""
     return read_arrays(folder / PREDICTIONS_FILE, ("prediction", "certainty"), owner=folder.name)
+
+
+def read_stream(folder: Path) -> dict[str, NDArray[Any]]:
+    """Read what a stream keeps of its first recording: K answers and E times of evaluation."""
+    found = read_arrays(folder / STREAM_FILE, (*_ANSWERS, *_EVALUATIONS), owner=folder.name)
+    for names in (_ANSWERS, _EVALUATIONS):
+        lengths = {name: len(found[name]) for name in names}
+        if len(set(lengths.values())) > 1:
+            raise ResultError(f"has arrays of different lengths: {lengths}", path=folder / STREAM_FILE)
+    return found
 
 
 def read_history(folder: Path) -> pd.DataFrame | None:

@@ -24,8 +24,10 @@ class StreamConfig(Config):
 
     Latency is `latency_ms`, or drawn from the whole chain of a measured `profile` times `scale`; `added_ms` comes on
     top. It is the time from the capture of the newest input to the publication of the grid, once a worker has begun.
+    Of answers that lie in logs it is as `recorded`.
     """
 
+    recorded: bool = False  # answers, what they are for and their publication are those of a log of predictions
     latency_ms: float | None = Field(None, ge=0, le=60_000)
     profile: str | None = Field(None, min_length=1)  # file that `semgrid-eval latency` writes
     profile_model: str | None = None  # whose latency the profile is asked for; the row's own if not given
@@ -41,8 +43,10 @@ class StreamConfig(Config):
 
     @model_validator(mode="after")
     def _one_source_of_latency(self) -> Self:
-        if (self.latency_ms is None) == (self.profile is None):
-            raise ValueError("give one of latency_ms and profile")
+        if self.recorded + (self.latency_ms is not None) + (self.profile is not None) != 1:
+            raise ValueError("give one of latency_ms, profile and recorded: true")
+        if self.recorded and (self.workers, self.rule, self.asked) != ("one", "newest", "capture"):
+            raise ValueError("recorded: workers, rule and asked are of what is simulated, and nothing is")
         if self.profile is None and (self.scale != 1.0 or self.profile_model is not None):
             raise ValueError("scale and profile_model belong to a profile, and none is given")
         if self.workers == "many" and self.rule != "newest":
@@ -52,11 +56,13 @@ class StreamConfig(Config):
     @property
     def words(self) -> str:
         """Say how its answers come."""
+        added = f" and {self.added_ms:g} ms" if self.added_ms else ""
+        moved = "moved along with the vehicle" if self.move else "not moved"
+        if self.recorded:
+            return f"published as recorded{added}, {moved}"
         latency = f"{self.latency_ms:g} ms" if self.profile is None else f"latency of {self.profile}"
         if self.scale != 1.0:
             latency = f"{self.scale:g} times the {latency}"
-        added = f" and {self.added_ms:g} ms" if self.added_ms else ""
-        moved = "moved along with the vehicle" if self.move else "not moved"
         worker = {"one": "one worker", "many": "as many workers as needed"}[self.workers]
         rule = " that waits for a shrinking tail" * (self.rule == "shrinking_tail")
         return f"{ASKED_IN_WORDS[self.asked]}, {moved}, {latency}{added}, {worker}{rule}"

@@ -15,6 +15,7 @@ from semgrid_eval.scores.metrics.metric import ScoredWindows
 from semgrid_eval.scores.metrics.table import Sums, count_windows
 from semgrid_eval.streams.plan import StreamPlan
 from semgrid_eval.streams.schedule import NONE
+from semgrid_eval.streams.shown import Arrays, FirstRecording
 from semgrid_eval.windows.grids import GridData, shift_grids, shift_in_cells
 
 Grids = NDArray[np.uint8]
@@ -26,6 +27,7 @@ class StreamEvaluation:
 
     sums: Sums
     seconds: float
+    shown: Arrays  # what is kept to be looked at
 
 
 def evaluate_stream(
@@ -55,7 +57,8 @@ def evaluate_stream(
     Raises:
         InputError: the model's answer is malformed.
     """
-    predictions = _Predictions(model, plan, batch)
+    shown = FirstRecording(plan)
+    predictions = _Predictions(model, plan, batch, shown)
     data, blocks = plan.answers.data, plan.blocks()
     unseen = unseen or Unseen(data, plan.evaluated)
     total: dict[tuple[str, str], NDArray[np.int32]] = {}
@@ -65,7 +68,9 @@ def evaluate_stream(
         prediction, certainty = predictions.at(plan.used[chosen], frames, move=move)
         target = data.grids[data.sensor_index(data.target), torch.from_numpy(frames).to(data.grids.device)]
         truth = target.cpu().numpy()
-        answer, left_out = apply_mask(prediction, unseen.at(chosen), mask_mode)
+        masked = unseen.at(chosen)
+        shown.evaluate(truth, masked)
+        answer, left_out = apply_mask(prediction, masked, mask_mode)
         scored = ScoredWindows(
             target=truth,
             prediction=answer,
@@ -80,7 +85,7 @@ def evaluate_stream(
                 total[key] = np.zeros((int(blocks[-1]) + 1, *counted.shape[1:]), np.int32)
             np.add.at(total[key], blocks[chosen], counted)
         progress(min(start + batch, len(plan.evaluated)), len(plan.evaluated))
-    return StreamEvaluation(total, predictions.seconds)
+    return StreamEvaluation(total, predictions.seconds, shown.arrays())
 
 
 class Unseen:
@@ -119,8 +124,8 @@ def unseen_truth(data: GridData, frames: NDArray[np.int64]) -> NDArray[np.bool_]
 class _Predictions:
     """The answers of a model, predicted in batches in the order of their use and forgotten afterwards."""
 
-    def __init__(self, model: Model, plan: StreamPlan, batch: int) -> None:
-        self._model, self._plan, self._batch = model, plan, batch
+    def __init__(self, model: Model, plan: StreamPlan, batch: int, shown: FirstRecording) -> None:
+        self._model, self._plan, self._batch, self._shown = model, plan, batch, shown
         self._first, self._held = 0, None  # type: tuple[int, tuple[Grids, Grids] | None]
         self.seconds = 0.0
 
@@ -150,6 +155,7 @@ class _Predictions:
                 seen = self._plan.answers.batch(slice(start, min(start + self._batch, last + 1)))
                 answer = answered(self._model, seen)
                 self.seconds += answer.seconds
+                self._shown.answer(answer.prediction, answer.certainty)
                 found.append((answer.prediction, answer.certainty))
             parts = ([] if kept is None else [kept]) + found
             self._first = first

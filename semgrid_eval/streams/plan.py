@@ -12,7 +12,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.files import DIGEST_CHARACTERS
 from semgrid_eval.streams.config import StreamConfig
 from semgrid_eval.streams.leads import Drive, times_asked
-from semgrid_eval.streams.schedule import NONE, Times, many_workers, newest_at, one_worker
+from semgrid_eval.streams.schedule import NONE, Answers, Recorded, Times, many_workers, newest_at, one_worker
 from semgrid_eval.windows.data import WindowConfig, WindowSet
 from semgrid_eval.windows.grids import GridData, shift_in_cells
 from semgrid_eval.windows.lead import frames_of
@@ -23,6 +23,8 @@ BLOCK_S = 0.5
 
 Latencies = Callable[[str, int], Times]
 """How long the work on each frame of a recording takes: by its name and number of frames, (F,) ns."""
+RecordedOf = Callable[[str], Recorded]
+"""The answers of a recording in a log of predictions, by its name."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,7 @@ class StreamPlan:
     """E times of evaluation with the answers used there, and these as windows of K answers; frames lie along F."""
 
     answers: WindowSet  # (K) what the model is asked, in the order of recordings and captures
+    numbers: NDArray[np.int64]  # (K,) place of each among all answers that its recording has
     target_m: NDArray[np.float64]  # (K, 2) position of the vehicle at the time that each answer is for
     for_ns: Times  # (K,)
     capture_ns: Times  # (K,) of the newest input
@@ -66,6 +69,7 @@ def plan_stream(
     sensors: Sequence[str],
     translate: bool = True,
     limits_ns: tuple[int, int] = (0, 1 << 62),
+    recorded: RecordedOf | None = None,
 ) -> StreamPlan:
     """Plan the stream of some recordings.
 
@@ -78,11 +82,13 @@ def plan_stream(
         sensors: of the inputs.
         translate: whether inputs are moved to where the vehicle is at the time that an answer is for.
         limits_ns: the shortest and the longest lead that the model can be asked for.
+        recorded: answers that lie in logs; then nothing is simulated, and a model is shown what there was by then.
 
     Raises:
         InputError: no recording has a frame with all its inputs before it.
     """
-    found = [_Part(data, index, config, window, latencies, limits_ns) for index in recordings]
+    how = _How(config, window, latencies, limits_ns, recorded)
+    found = [_Part(data, index, how) for index in recordings]
     parts = [part for part in found if len(part.evaluated)]
     if not any(len(part.answers.frame) for part in parts):
         reach = window.span_frames + 1
@@ -90,9 +96,10 @@ def plan_stream(
     counts = np.cumsum([0, *(len(part.kept) for part in parts)])
     used = [np.where(part.used == NONE, NONE, part.used + start) for part, start in zip(parts, counts, strict=False)]
     columns = [np.concatenate(column) for column in zip(*(part.columns() for part in parts), strict=True)]
-    frames, target_frames, target_m, for_ns, begin_ns, publish_ns = columns
+    frames, target_frames, target_m, for_ns, capture_ns, begin_ns, publish_ns, numbers = columns
     offsets = np.arange(-window.span_frames, 1, window.step_frames)
-    inputs = frames[:, None] + offsets
+    first_frames = data.first_frames[data.locate(frames)[0]]  # which only recorded answers can reach back before
+    inputs = np.maximum(frames[:, None] + offsets, first_frames[:, None])
     device = data.grids.device
     moved_m = target_m[:, None] - data.position_m[inputs]
     lead_ns = for_ns[:, None] - data.stamps_ns[inputs]
@@ -108,9 +115,10 @@ def plan_stream(
     )
     return StreamPlan(
         answers=answers,
+        numbers=numbers,
         target_m=target_m,
         for_ns=for_ns,
-        capture_ns=data.stamps_ns[frames],
+        capture_ns=capture_ns,
         begin_ns=begin_ns,
         publish_ns=publish_ns,
         evaluated=np.concatenate([part.evaluated for part in parts]),
@@ -120,33 +128,43 @@ def plan_stream(
     )
 
 
+@dataclass(frozen=True)
+class _How:
+    """Where answers come from, as `plan_stream` is told."""
+
+    config: StreamConfig
+    window: WindowConfig
+    latencies: Latencies
+    limits_ns: tuple[int, int]
+    recorded: RecordedOf | None
+
+    def answers(self, name: str, stamps_ns: Times) -> Answers:
+        """Simulate the answers of a recording."""
+        took_ns, first = self.latencies(name, len(stamps_ns)), self.window.span_frames
+        if self.config.workers == "many":
+            return many_workers(stamps_ns, took_ns, first)
+        return one_worker(stamps_ns, took_ns, first, self.config.rule)
+
+
 class _Part:
     """The stream of one recording; of its answers, those that are used."""
 
-    def __init__(
-        self,
-        data: GridData,
-        index: int,
-        config: StreamConfig,
-        window: WindowConfig,
-        latencies: Latencies,
-        limits_ns: tuple[int, int],
-    ) -> None:
-        self._data, self._begin = data, int(data.first_frames[index])
+    def __init__(self, data: GridData, index: int, how: _How) -> None:
+        config, self._begin = how.config, int(data.first_frames[index])
         own = slice(self._begin, int(data.first_frames[index + 1]))
         self._stamps_ns, self._position_m = data.stamps_ns[own], data.position_m[own]
-        took_ns = latencies(data.recordings[index], len(self._stamps_ns))
-        first = window.span_frames
-        if config.workers == "many":
-            self.answers = many_workers(self._stamps_ns, took_ns, first)
-        else:
-            self.answers = one_worker(self._stamps_ns, took_ns, first, config.rule)
+        name = data.recordings[index]
+        recorded = how.recorded(name) if how.recorded else None
+        self.answers = recorded.answers(self._stamps_ns) if recorded else how.answers(name, self._stamps_ns)
+        self._capture_ns = recorded.capture_ns if recorded else self._stamps_ns[self.answers.frame]
         local = evaluated_frames(self._stamps_ns, config.rate_hz)
         evaluated_ns = self._stamps_ns[local]
-        used = newest_at(evaluated_ns, self._stamps_ns[self.answers.frame], self.answers.publish_ns)
+        told_ns = recorded.for_ns if recorded else None
+        used = newest_at(evaluated_ns, self._capture_ns, self.answers.publish_ns, told_ns)
+        window = how.window
         lead = window.lead_frames if window.lead_ms is None else frames_of(window.lead_ms, self._stamps_ns)
         drive = Drive(self._stamps_ns, evaluated_ns, used, lead)
-        for_ns = times_asked(config.asked, self.answers, drive, limits_ns)
+        for_ns = times_asked(config.asked, self.answers, drive, how.limits_ns) if told_ns is None else told_ns
         answered = self.answers.publish_ns.min(initial=int(self._stamps_ns[-1]))
         self.first_answer_ns = int(answered) - int(self._stamps_ns[0])
         if config.asked == "exact":  # each use is an answer of its own
@@ -160,14 +178,16 @@ class _Part:
         self.evaluated = local + self._begin
 
     def columns(self) -> Iterator[NDArray[np.int64] | NDArray[np.float64]]:
-        """Return of the used answers: frame and target frame along F, position, time it is for, begin, publication."""
+        """Return of the used answers: frame and target frame along F, position, all times in their order, number."""
         stamps_ns, kept = self._stamps_ns, self.kept
         yield self.answers.frame[kept] + self._begin
         yield np.clip(np.searchsorted(stamps_ns, self._for_ns), 0, len(stamps_ns) - 1) + self._begin
         yield positions_at(self._for_ns, stamps_ns, self._position_m)
         yield self._for_ns
+        yield self._capture_ns[kept]
         yield self.answers.begin_ns[kept]
         yield self.answers.publish_ns[kept]
+        yield kept
 
 
 def evaluated_frames(stamps_ns: Times, rate_hz: float | None) -> NDArray[np.int64]:

@@ -17,11 +17,24 @@ NONE = -1
 
 
 class Answers(NamedTuple):
-    """K answers in the order of their captures: the frame (index) of the newest input, and times in ns."""
+    """K answers, simulated ones in the order of their captures: the frame (index) of the newest input, times in ns."""
 
     frame: NDArray[np.int64]
     begin_ns: Times
     publish_ns: Times
+
+
+class Recorded(NamedTuple):
+    """K answers that a log of predictions holds, in its order."""
+
+    capture_ns: Times
+    for_ns: Times
+    publish_ns: Times
+
+    def answers(self, captures_ns: Times) -> Answers:
+        """Find the frames of the newest inputs, by the captures of all frames (F,); work begins with the capture."""
+        frames = np.searchsorted(captures_ns, self.capture_ns, side="right") - 1
+        return Answers(np.maximum(frames, 0), self.capture_ns, self.publish_ns)
 
 
 def many_workers(captures_ns: Times, latencies_ns: Times, first: int) -> Answers:

@@ -4,7 +4,7 @@ import hashlib
 import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Self
+from typing import Annotated, Protocol, Self
 
 import numpy as np
 import torch
@@ -159,6 +159,15 @@ class WindowBatch:
     target: Tensor  # (B, H, W) uint8
     mask: Tensor  # (B, H, W) bool, M: seen in an aligned input, yet unknown in the target
     truth: Tensor | None = None  # (B, ...) what a model is told that says so by `Model.asks`; None for all others
+    # (B, 2, H, W) uint8 class ids and their certainty, 255 = 1, of a model that says so by `Model.answers_in`.
+    answers: Tensor | None = None
+
+
+class Answers(Protocol):
+    """Answers that were made elsewhere, read when they are asked for."""
+
+    def __getitem__(self, chosen: Tensor | slice, /) -> Tensor:
+        """Return class ids and their certainty, 255 = 1, of the chosen windows: (B, 2, H, W) uint8."""
 
 
 @dataclass(frozen=True)
@@ -198,6 +207,7 @@ class WindowSet:
     lead_s: Tensor  # (N, T) float32
     disturb: Disturb | None = None  # what is wrong with the inputs that a model sees; M and targets never change
     truth: Tensor | None = None  # (N, ...) what of the truth is told; nothing but for a model that asks
+    answers: Answers | None = None  # of a model that runs elsewhere
 
     def __len__(self) -> int:
         return len(self.target_frames)
@@ -227,6 +237,7 @@ class WindowSet:
             target=target,
             mask=mask,
             truth=None if self.truth is None else self.truth[chosen],
+            answers=None if self.answers is None else self.answers[chosen],
         )
 
     def disturbed(self, how: Disturbance | None, spec: GridSpec) -> "WindowSet":
@@ -281,14 +292,6 @@ def select_windows(
         shift_cells=torch.from_numpy(shift_in_cells(moved_m, data.cell_m)).to(device),
         lead_s=torch.from_numpy((lead_ns * 1e-9).astype(np.float32)).to(device),
     )
-
-
-def first_of_each(windows: WindowSet) -> WindowSet:
-    """Return the first window of each recording."""
-    owners, _ = windows.data.locate(windows.target_frames.cpu().numpy())
-    chosen = np.unique(owners, return_index=True)[1]
-    parts = ("inputs", "target_frames", "shift_cells", "lead_s")
-    return replace(windows, truth=None, **{name: getattr(windows, name)[chosen] for name in parts})
 
 
 def window_arrays(windows: WindowSet, *, batch: int = 64) -> dict[str, NDArray[np.uint8] | NDArray[np.bool_]]:

@@ -5,6 +5,7 @@ import pytest
 import yaml
 from click.testing import CliRunner
 from mcap.reader import make_reader
+from support.exact_grids import read_exact
 from support.toy_world import street
 
 from semgrid_eval.cli.main import cli, main
@@ -55,7 +56,9 @@ def test_inputs_are_moved_for_a_row_without_translation_too_as_the_help_says(her
         call("play", "runs/first", row, "--out", f"{row}.mcap", "--logs", "logs")
         with Path(f"{row}.mcap").open("rb") as stream:
             found = make_reader(stream).iter_messages(["/grid/input/full/exact", f"/grid/prediction/{row}/exact"])
-            played[row] = {channel.topic.rsplit("/", 2)[1]: message.data for _, channel, message in found}
+            played[row] = {
+                channel.topic.rsplit("/", 2)[1]: read_exact(message.data)[0].tobytes() for _, channel, message in found
+            }
     assert played["BL-NT"]["full"] == played["BL-DC"]["full"] == played["BL-DC"]["BL-DC"]
     assert played["BL-NT"]["BL-NT"] != played["BL-NT"]["full"]
 

@@ -15,7 +15,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1esemgrid/v1/semantic_grid.proto\x12\nsemgrid.v1\x1a\x1fgoogle/protobuf/timestamp.proto\"\xd3\x01\n\x0cSemanticGrid\x12-\n\ttimestamp\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x10\n\x08\x66rame_id\x18\x02 \x01(\t\x12\x0c\n\x04rows\x18\x03 \x01(\r\x12\x0f\n\x07\x63olumns\x18\x04 \x01(\r\x12\x13\n\x0b\x63\x65ll_size_m\x18\x05 \x01(\x01\x12\x12\n\ncorner_x_m\x18\x06 \x01(\x01\x12\x12\n\ncorner_y_m\x18\x07 \x01(\x01\x12\x11\n\tclass_ids\x18\x08 \x01(\x0c\x12\x13\n\x0b\x63lass_names\x18\t \x03(\tb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1esemgrid/v1/semantic_grid.proto\x12\nsemgrid.v1\x1a\x1fgoogle/protobuf/timestamp.proto\"\x98\x02\n\x0cSemanticGrid\x12-\n\ttimestamp\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x10\n\x08\x66rame_id\x18\x02 \x01(\t\x12\x0c\n\x04rows\x18\x03 \x01(\r\x12\x0f\n\x07\x63olumns\x18\x04 \x01(\r\x12\x13\n\x0b\x63\x65ll_size_m\x18\x05 \x01(\x01\x12\x12\n\ncorner_x_m\x18\x06 \x01(\x01\x12\x12\n\ncorner_y_m\x18\x07 \x01(\x01\x12\x11\n\tclass_ids\x18\x08 \x01(\x0c\x12\x13\n\x0b\x63lass_names\x18\t \x03(\t\x12\x30\n\x0c\x63\x61pture_time\x18\n \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x11\n\tcertainty\x18\x0b \x01(\x0c\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -23,5 +23,5 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'semgrid.v1.semantic_grid_pb
 if _descriptor._USE_C_DESCRIPTORS == False:
   DESCRIPTOR._options = None
   _globals['_SEMANTICGRID']._serialized_start=80
-  _globals['_SEMANTICGRID']._serialized_end=291
+  _globals['_SEMANTICGRID']._serialized_end=360
 # @@protoc_insertion_point(module_scope)

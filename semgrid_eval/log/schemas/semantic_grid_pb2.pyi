@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class SemanticGrid(_message.Message):
-    __slots__ = ("timestamp", "frame_id", "rows", "columns", "cell_size_m", "corner_x_m", "corner_y_m", "class_ids", "class_names")
+    __slots__ = ("timestamp", "frame_id", "rows", "columns", "cell_size_m", "corner_x_m", "corner_y_m", "class_ids", "class_names", "capture_time", "certainty")
     TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
     FRAME_ID_FIELD_NUMBER: _ClassVar[int]
     ROWS_FIELD_NUMBER: _ClassVar[int]
@@ -18,6 +18,8 @@ class SemanticGrid(_message.Message):
     CORNER_Y_M_FIELD_NUMBER: _ClassVar[int]
     CLASS_IDS_FIELD_NUMBER: _ClassVar[int]
     CLASS_NAMES_FIELD_NUMBER: _ClassVar[int]
+    CAPTURE_TIME_FIELD_NUMBER: _ClassVar[int]
+    CERTAINTY_FIELD_NUMBER: _ClassVar[int]
     timestamp: _timestamp_pb2.Timestamp
     frame_id: str
     rows: int
@@ -27,4 +29,6 @@ class SemanticGrid(_message.Message):
     corner_y_m: float
     class_ids: bytes
     class_names: _containers.RepeatedScalarFieldContainer[str]
-    def __init__(self, timestamp: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., frame_id: _Optional[str] = ..., rows: _Optional[int] = ..., columns: _Optional[int] = ..., cell_size_m: _Optional[float] = ..., corner_x_m: _Optional[float] = ..., corner_y_m: _Optional[float] = ..., class_ids: _Optional[bytes] = ..., class_names: _Optional[_Iterable[str]] = ...) -> None: ...
+    capture_time: _timestamp_pb2.Timestamp
+    certainty: bytes
+    def __init__(self, timestamp: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., frame_id: _Optional[str] = ..., rows: _Optional[int] = ..., columns: _Optional[int] = ..., cell_size_m: _Optional[float] = ..., corner_x_m: _Optional[float] = ..., corner_y_m: _Optional[float] = ..., class_ids: _Optional[bytes] = ..., class_names: _Optional[_Iterable[str]] = ..., capture_time: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., certainty: _Optional[bytes] = ...) -> None: ...

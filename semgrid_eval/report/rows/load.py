@@ -188,10 +188,14 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
 def _besides_scores(run: Path, rows: Sequence[Row]) -> tuple[tuple[Fault, ...], tuple[str, ...]]:
     """Look at what a report's examples are made from: what is wrong with its files, and what a run found in logs."""
     results = [result for row in rows for result in row.results]
-    kept = [result.record.windows_id for result in results if result.record.stream is None]
-    asked = {files.windows_file(run, windows_id): "windows" for windows_id in kept}
-    predictions = (result.folder / files.PREDICTIONS_FILE for result in results)
-    asked |= {path: "predictions" for path in predictions if path.exists()}
+    asked = {
+        files.windows_file(run, result.record.windows_id): "windows"
+        for result in results
+        if result.record.stream is None
+    }
+    for file, kind in ((files.PREDICTIONS_FILE, "predictions"), (files.STREAM_FILE, "stream")):
+        kept = (result.folder / file for result in results)
+        asked |= {path: kind for path in kept if path.exists()}
     faults, said = [], list[str]()
     for path, kind in asked.items():
         owner = path.stem if kind == "windows" else path.parent.name
