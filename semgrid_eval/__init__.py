@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from semgrid_eval.scores.evaluate import evaluate as evaluate
     from semgrid_eval.scores.tidy import tidy as tidy
     from semgrid_eval.windows.data import WindowBatch as WindowBatch
-    from semgrid_eval.windows.data import WindowConfig as WindowConfig
     from semgrid_eval.windows.data import WindowSet as WindowSet
+    from semgrid_eval.windows.plan import WindowConfig as WindowConfig
 
 _NAMES = {
     "api": "build_grids convert find_logs fit load_run make_model make_windows open_log plot_grid "

@@ -32,8 +32,9 @@ from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.scores.results import RunRecord
 from semgrid_eval.scores.tidy import load_figures
 from semgrid_eval.sources.known import SOURCES, load_source
-from semgrid_eval.windows.data import WindowConfig, WindowSet, select_windows, training_windows
+from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

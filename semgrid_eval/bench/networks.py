@@ -25,8 +25,9 @@ from semgrid_eval.models.network import TrainingConfig, masked_loss, seeded_netw
 from semgrid_eval.models.newest import RepeatNewest
 from semgrid_eval.models.training import train
 from semgrid_eval.scores.evaluate import evaluate
-from semgrid_eval.windows.data import WindowConfig, WindowSet, select_windows, training_windows
+from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 _CELLS, _CELL_M, _FRAMES, _FRAME_NS = 128, 100 / 128, 30, 58_823_529
 _COARSE = 8  # cells of a random patch

@@ -16,8 +16,8 @@ from semgrid_eval.models.registry import MODELS, described, installed_models, is
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.facts import RowFacts, StreamFacts
 from semgrid_eval.streams.config import StreamConfig
-from semgrid_eval.windows.data import WindowConfig
 from semgrid_eval.windows.disturb.kinds import AnyDisturbance
+from semgrid_eval.windows.plan import WindowConfig
 
 
 def _found(model: str) -> type[Model] | None:

@@ -8,9 +8,10 @@ import numpy as np
 from semgrid_eval.errors import InputError
 from semgrid_eval.runs.data import GridSource, grid_digest
 from semgrid_eval.runs.row import Row
-from semgrid_eval.windows.data import WindowConfig, WindowPlan, WindowSet, select_windows
+from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import GridData
 from semgrid_eval.windows.lead import frames_of
+from semgrid_eval.windows.plan import WindowConfig, WindowPlan
 
 WindowPlanner = Callable[[Sequence[int], WindowConfig, Sequence[int]], WindowPlan]
 

@@ -37,13 +37,9 @@ from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
 from semgrid_eval.streams.evaluate import Unseen, evaluate_stream
 from semgrid_eval.streams.plan import StreamPlan
-from semgrid_eval.windows.data import (
-    WindowSet,
-    training_windows,
-    validation_windows,
-    window_arrays,
-)
+from semgrid_eval.windows.data import WindowSet, window_arrays
 from semgrid_eval.windows.grids import GridData
+from semgrid_eval.windows.plan import training_windows, validation_windows
 
 _log = logging.getLogger(__name__)
 

@@ -23,8 +23,9 @@ from semgrid_eval.streams.laps import Clock, Laps, Measured
 from semgrid_eval.streams.live import GIVEN, GRID, WINDOW, Chain, LiveLog
 from semgrid_eval.streams.profile import LatencyProfile, MadeBy
 from semgrid_eval.streams.untrained import TimedModel, timed_model
-from semgrid_eval.windows.data import WindowSet, select_windows, training_windows
+from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import training_windows
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,9 @@ from semgrid_eval.sources.matching import SemiGlobalMatching
 from semgrid_eval.sources.town.picture_errors import coded_disparity
 from semgrid_eval.streams.laps import Laps
 from semgrid_eval.streams.right_images import RightImages
-from semgrid_eval.windows.data import WindowBatch, WindowConfig
+from semgrid_eval.windows.data import WindowBatch
 from semgrid_eval.windows.grids import shift_grids, shift_in_cells
+from semgrid_eval.windows.plan import WindowConfig
 
 _NAME, _SENSOR = "full", CameraSensor()
 GRID = GridConfig(sensors={_NAME: _SENSOR}, target=(_NAME,))

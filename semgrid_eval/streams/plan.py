@@ -13,9 +13,10 @@ from semgrid_eval.files import DIGEST_CHARACTERS
 from semgrid_eval.streams.config import StreamConfig
 from semgrid_eval.streams.leads import Drive, times_asked
 from semgrid_eval.streams.schedule import NONE, Answers, Recorded, Times, many_workers, newest_at, one_worker
-from semgrid_eval.windows.data import WindowConfig, WindowSet
+from semgrid_eval.windows.data import WindowSet
 from semgrid_eval.windows.grids import GridData, shift_in_cells
 from semgrid_eval.windows.lead import frames_of
+from semgrid_eval.windows.plan import WindowConfig
 
 BLOCK_S = 0.5
 """Length of what is counted together; the warm-up is rounded up to whole blocks."""

@@ -11,8 +11,9 @@ from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.augment import AugmentConfig, augment, flipped, misaligned, rotated
 from semgrid_eval.models.network import TrainingConfig
-from semgrid_eval.windows.data import WindowBatch, WindowConfig, select_windows, training_windows
+from semgrid_eval.windows.data import WindowBatch, select_windows
 from semgrid_eval.windows.grids import covered_without_truth, shift_grids, stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 ALL = AugmentConfig(flip=0.5, rotate_deg=10.0, misalign_cells=2)
 FIELDS = ("past", "shift_cells", "lead_s", "target", "mask")

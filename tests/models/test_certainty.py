@@ -7,8 +7,9 @@ from support.recordings import random_recording
 
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.models.certainty import Certainty
-from semgrid_eval.windows.data import WindowConfig, select_windows, training_windows
+from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 
 @pytest.fixture(name="windows")

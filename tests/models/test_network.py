@@ -24,8 +24,9 @@ from semgrid_eval.models.network import (
     jaccard_loss,
     masked_loss,
 )
-from semgrid_eval.windows.data import Window, select_windows
+from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import Window
 
 GRIDS = torch.randint(0, CLASS_COUNT, (2, 3, 8, 8), generator=torch.Generator().manual_seed(0), dtype=torch.uint8)
 

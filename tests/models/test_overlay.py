@@ -12,8 +12,9 @@ from support.recordings import recording
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.newest import RepeatNewest
 from semgrid_eval.models.overlay import FuseAll, OverlaySensors, overlay
-from semgrid_eval.windows.data import Window, WindowBatch, select_windows
+from semgrid_eval.windows.data import WindowBatch, select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import Window
 
 UPPER, LOWER = "split1_upper", "split1_lower"
 

@@ -12,8 +12,9 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.models.model import Model, require_scores
 from semgrid_eval.models.network import Network
 from semgrid_eval.models.registry import ENTRY_POINT_GROUP, find_model, is_named, own_models, version_of
-from semgrid_eval.windows.data import Window, select_windows
+from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import Window
 
 OWN_MODELS = """
 import torch

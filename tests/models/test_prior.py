@@ -12,8 +12,9 @@ from support.recordings import random_recording
 from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
 from semgrid_eval.models import prior as prior_module
 from semgrid_eval.models.prior import FLOOR, SMOOTHING_CELLS, CellPrior
-from semgrid_eval.windows.data import WindowConfig, select_windows, training_windows
+from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 
 def windows_of(*sensors, inputs=3):

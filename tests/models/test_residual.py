@@ -10,8 +10,9 @@ from support.recordings import random_recording
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.models.prior import CellPrior
 from semgrid_eval.models.residual import LEAD_BINS, Residual
-from semgrid_eval.windows.data import WindowBatch, WindowConfig, select_windows, training_windows
+from semgrid_eval.windows.data import WindowBatch, select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 SMALL = {"widths": [8, 8], "fine": 4}
 CAR = CLASS_NAMES.index("car")

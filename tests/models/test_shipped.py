@@ -13,8 +13,9 @@ from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.models.checkpoint import read_header
 from semgrid_eval.models.registry import find_model
 from semgrid_eval.models.shipped import CELL_M, WEIGHTS, TownResidual
-from semgrid_eval.windows.data import WindowConfig, select_windows, training_windows
+from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,9 @@ from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.models import table as table_module
 from semgrid_eval.models.newest import RepeatNewest
 from semgrid_eval.models.table import GRID_LIMIT, SMOOTHING_CELLS, ClassTable
-from semgrid_eval.windows.data import WindowConfig, select_windows, training_windows
+from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 
 def windows_of(*recordings, sensors=("full",), inputs=2):

@@ -15,8 +15,9 @@ from semgrid_eval.models.encoder_decoder import EncoderDecoder
 from semgrid_eval.models.network import Network, input_planes
 from semgrid_eval.models.training import DivergedError, draw_windows, train
 from semgrid_eval.progress import silent
-from semgrid_eval.windows.data import WindowConfig, select_windows, training_windows
+from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 CPU = torch.device("cpu")
 QUICK = {"epochs": 3, "updates_per_epoch": 3, "batch": 4, "schedule": {"drop_epoch": 2}, "precision": "float32"}

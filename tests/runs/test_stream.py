@@ -106,8 +106,8 @@ def test_the_page_shows_strategies_and_the_best_lead_can_be_taken(done, tmp_path
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [
-        ({"stream": {}}, "give one of latency_ms and profile"),
-        ({"stream": {"latency_ms": 1, "profile": "p.json"}}, "give one of latency_ms and profile"),
+        ({"stream": {}}, "give one of latency_ms, profile and recorded"),
+        ({"stream": {"latency_ms": 1, "profile": "p.json"}}, "give one of latency_ms, profile and recorded"),
         ({"stream": {"latency_ms": -1}}, "latency_ms"),
         ({"stream": {"latency_ms": 1, "scale": 2}}, "scale and profile_model belong to a profile"),
         ({"stream": {"latency_ms": 1, "workers": "many", "rule": "shrinking_tail"}}, "one worker waits"),

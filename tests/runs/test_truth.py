@@ -171,7 +171,8 @@ def test_no_network_and_no_baseline_asks_for_the_truth():
 def test_answers_stand_at_their_windows_whatever_the_order_of_logs(logs, tmp_path):
     from semgrid_eval.executors import InProcess
     from semgrid_eval.progress import silent_stage
-    from semgrid_eval.windows.data import Window, WindowConfig, select_windows
+    from semgrid_eval.windows.data import select_windows
+    from semgrid_eval.windows.plan import Window, WindowConfig
 
     row = Row(name="x", model="newest", window=WindowConfig(step_frames=3, target_frame=8))
     data = RunData(logs, tmp_path, [row], executor=InProcess(), device=torch.device("cpu"), stage=silent_stage)

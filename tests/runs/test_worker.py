@@ -8,7 +8,7 @@ from semgrid_eval.progress import silent_stage
 from semgrid_eval.runs.matrix import Matrix
 from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.runner import RunOptions, make_worker
-from semgrid_eval.windows.data import WindowConfig
+from semgrid_eval.windows.plan import WindowConfig
 
 SHORT = WindowConfig(step_frames=2, target_frame=8)
 ROWS = [

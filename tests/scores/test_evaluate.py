@@ -12,8 +12,9 @@ from semgrid_eval.models.encoder_decoder import EncoderDecoder
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.newest import RepeatNewest
 from semgrid_eval.scores.evaluate import evaluate
-from semgrid_eval.windows.data import WindowConfig, select_windows, validation_windows, window_arrays
+from semgrid_eval.windows.data import select_windows, window_arrays
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, validation_windows
 
 
 def windows_of(*recordings):

@@ -19,8 +19,9 @@ from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.streams.chain import Amount, Parts, build_chain, measure_chain, models_for, profile_of
 from semgrid_eval.streams.live import GIVEN, GRID, WINDOW, Chain
-from semgrid_eval.windows.data import select_windows, training_windows
+from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import training_windows
 
 FRAMES = 12
 WHOLE = FRAMES - WINDOW.span_frames

@@ -16,8 +16,9 @@ from semgrid_eval.scores.metrics.iou import confusion
 from semgrid_eval.streams.config import StreamConfig
 from semgrid_eval.streams.evaluate import evaluate_stream, unseen_truth
 from semgrid_eval.streams.plan import evaluated_frames, plan_stream, positions_at
-from semgrid_eval.windows.data import WindowConfig, select_windows, training_windows
+from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 SIZE, FRAMES = 16, 24
 SPEC = GridSpec(rows=SIZE, columns=SIZE, cell_m=1.0, agent_row=SIZE, agent_column=SIZE // 2)

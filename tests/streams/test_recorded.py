@@ -9,8 +9,8 @@ from support.recordings import FRAME_NS, random_recording
 from semgrid_eval.streams.config import StreamConfig
 from semgrid_eval.streams.plan import plan_stream
 from semgrid_eval.streams.schedule import NONE, Recorded
-from semgrid_eval.windows.data import WindowConfig
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig
 
 FRAMES = 10
 DATA = stack_recordings([random_recording(seed, frames=FRAMES, size=8) for seed in (1, 2)], cell_m=1.0)

@@ -6,8 +6,9 @@ import torch
 from semgrid_eval.models.device import settle_process
 from semgrid_eval.models.network import Network
 from semgrid_eval.models.registry import MODELS, find_model
-from semgrid_eval.windows.data import WindowConfig, WindowSet, select_windows, training_windows
+from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import WindowConfig, training_windows
 
 CPU, CUDA = torch.device("cpu"), torch.device("cuda")
 NEEDS_CUDA = [

@@ -5,9 +5,10 @@ from support.recordings import recording
 
 from semgrid_eval.config import parse_config
 from semgrid_eval.grids.spec import GridSpec
-from semgrid_eval.windows.data import Window, WindowSet, select_windows
+from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.disturb.kinds import KINDS
 from semgrid_eval.windows.grids import stack_recordings
+from semgrid_eval.windows.plan import Window
 
 SIDE = 9
 SPEC = GridSpec(rows=SIDE, columns=SIDE, cell_m=1.0, agent_row=SIDE, agent_column=4)

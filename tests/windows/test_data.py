@@ -10,15 +10,9 @@ from hypothesis import strategies as st
 from support.recordings import FRAME_NS, random_recording, recording
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.windows.data import (
-    Window,
-    WindowConfig,
-    select_windows,
-    training_windows,
-    validation_windows,
-    window_arrays,
-)
+from semgrid_eval.windows.data import select_windows, window_arrays
 from semgrid_eval.windows.grids import GHOST_S, covered_without_truth, shift_grids, shift_in_cells, stack_recordings
+from semgrid_eval.windows.plan import Window, WindowConfig, training_windows, validation_windows
 
 SENSORS = ("full", "upper", "lower")
 

@@ -4,7 +4,7 @@ import pytest
 
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, InputError
-from semgrid_eval.windows.data import Window, WindowConfig, training_windows, validation_windows
+from semgrid_eval.windows.plan import Window, WindowConfig, training_windows, validation_windows
 
 
 def test_thirty_frames_give_twenty_training_windows():
