@@ -58,7 +58,8 @@ _NAMES = {
     "playback.export": "export_predictions write_predictions",
     "scores.evaluate": "Evaluation evaluate",
     "scores.tidy": "tidy",
-    "windows.data": "WindowBatch WindowConfig WindowSet",
+    "windows.data": "WindowBatch WindowSet",
+    "windows.plan": "WindowConfig",
 }
 _PLACES = {name: f"{__name__}.{module}" for module, names in _NAMES.items() for name in names.split()}
 __all__ = ["__version__", *_PLACES]
