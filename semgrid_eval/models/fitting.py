@@ -71,5 +71,5 @@ def fit_model(made: type[Model], settings: Config, lesson: Lesson, progress: Pro
 def batch_on(batch: WindowBatch, device: torch.device) -> WindowBatch:
     """Return a batch with all its tensors on a device."""
     names = ("past", "shift_cells", "lead_s", "target", "mask")
-    truth = None if batch.truth is None else batch.truth.to(device)
-    return replace(batch, truth=truth, **{name: getattr(batch, name).to(device) for name in names})
+    told = {name: each.to(device) for name in ("truth", "answers") if (each := getattr(batch, name)) is not None}
+    return replace(batch, **told, **{name: getattr(batch, name).to(device) for name in names})

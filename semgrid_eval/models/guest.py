@@ -109,6 +109,10 @@ class _Guest:
             return None, b""
         return [type(truth).__module__, type(truth).__name__, asdict(truth)], b""  # type: ignore[call-overload]
 
+    def answers_in(self, made: type[Model], settings: dict[str, Any]) -> Answer:
+        """Say where its answers are, if they were made elsewhere."""
+        return made.answers_in(made.parse_settings(settings)), b""
+
     def fit(self, made: type[Model], settings: dict[str, Any], lesson: Lesson, threads: int) -> Answer:
         """Make it ready to predict, with seed and threads as the run has them."""
         self._model, self._device = None, lesson.device

@@ -16,7 +16,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.models.beside import Code
 from semgrid_eval.models.fitting import Fitted, Lesson, batch_on, fit_model
 from semgrid_eval.models.host import Host, code_state, current_host
-from semgrid_eval.models.model import Bound, Given, Model
+from semgrid_eval.models.model import AnswersIn, Bound, Given, Model
 from semgrid_eval.models.network import Network, NetworkSettings, TrainingConfig
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.windows.data import WindowBatch
@@ -110,6 +110,12 @@ class StandIn(Model):
         """Say what of the truth it is told."""
         found = cls.host.recall("asks", settings=_plain(settings), given=given)
         return None if found is None else _truth(found, cls.host.name)
+
+    @classmethod
+    def answers_in(cls, settings: Any) -> AnswersIn | None:  # noqa: ANN401 - of the class `Settings`
+        """Say where its answers are, if they were made elsewhere."""
+        found = cls.host.recall("answers_in", settings=_plain(settings))
+        return None if found is None else AnswersIn(*found)
 
     @classmethod
     def learns(cls) -> bool:

@@ -239,6 +239,31 @@ def test_labels_say_where_answers_are_from_and_nothing_of_inputs():
     ]
 
 
+OWN = """
+from semgrid_eval.models.recorded import Recorded
+
+class Mine(Recorded):
+    files = ()
+    def predict(self, batch):
+        return super().predict(batch).flip(dims=[-1])
+"""
+
+
+def test_a_model_of_ones_own_is_given_answers_that_were_made_elsewhere(exported, logs, tmp_path):
+    (tmp_path / "mine.py").write_text(OWN)
+    rows = [
+        logged(exported / "plain"),
+        {**logged(exported / "plain", name="mine"), "model": f"{tmp_path}/mine.py:Mine"},
+    ]
+    run(rows, logs, tmp_path / "out", window=ALL)
+    kept = {}
+    for name in ("logged", "mine"):
+        folder = results.result_folder(tmp_path / "out", record_of(tmp_path / "out", name).id)
+        kept[name] = results.read_predictions(folder)
+    for what in ("prediction", "certainty"):
+        np.testing.assert_array_equal(kept["mine"][what], kept["logged"][what][..., ::-1])
+
+
 def test_outside_a_run_there_are_no_answers(logs):
     windows = sg.make_windows(sg.build_grids(sg.find_logs(logs)[0]), sg.WindowConfig(step_frames=2, target_frame=None))
     with pytest.raises(InputError, match="its answers are in logs, which only `semgrid-eval run` reads"):
