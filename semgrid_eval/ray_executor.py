@@ -56,7 +56,7 @@ class RayExecutor:
         self._folder: Path | None = None  # of a cluster that is started here
         self._cpus, self._gpus = cpus, gpus
         if address == LOCAL:
-            _keep_to_this_machine()
+            keep_to_this_machine()
         try:
             self._ray: Any = importlib.import_module("ray")  # an extra, and untyped
         except ImportError:
@@ -134,7 +134,7 @@ class RayExecutor:
             raise InputError(f"cannot be reached: {first_line(error)}", field=f"ray {name}") from error
 
 
-def _keep_to_this_machine() -> None:
+def keep_to_this_machine() -> None:
     """Set, before Ray is imported, what keeps others out of a cluster that is started here."""
     if "ray" in sys.modules and any(os.environ.get(name) != value for name, value in _KEPT_HERE.items()):
         settings = " ".join(f"{name}={value}" for name, value in _KEPT_HERE.items())

@@ -10,9 +10,7 @@ from support.pieces import environment, fit_alone, square_or_die
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import InProcess, WorkerDied, thread_variables
-from semgrid_eval.ray_executor import _keep_to_this_machine
 
-_keep_to_this_machine()
 ray = pytest.importorskip("ray", reason="the extra 'ray' is not installed")
 ray.cloudpickle.register_pickle_by_value(pieces)  # the cluster's processes cannot import it
 
