@@ -8,6 +8,7 @@ import pytest
 from support.small_runs import run, write_logs
 
 from semgrid_eval.errors import ConfigError
+from semgrid_eval.executors import Processes
 from semgrid_eval.report.page.write import write_report
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.scores import results
@@ -157,3 +158,26 @@ def test_latencies_of_a_profile_are_drawn_by_recording_and_a_model_that_it_lacks
     path.write_text(json.dumps({**profile, "stages": {"grid": [50.0, 91.0]}}))
     again = run(rows, logs, tmp_path / "run")
     assert again.rows[0].results[0] != record.rows[0].results[0], "another profile, another result"
+
+
+def test_two_processes_give_the_same_numbers_as_one(logs, tmp_path):
+    profile = {
+        "format": 1,
+        "made_by": {"command": "test", "version": "0", "machine": {}},
+        "stages": {"grid": [20.0, 90.0, 150.0]},
+        "models": {"newest": [1.0, 2.0, 3.0], "fuse": [10.0, 20.0, 30.0]},
+    }
+    path = tmp_path / "latency.json"
+    path.write_text(json.dumps(profile))
+    rows = [
+        {"name": "newest", "model": "newest", "stream": {"profile": str(path), "workers": "many"}},
+        {"name": "fuse", "model": "fuse", "stream": {"profile": str(path), "asked": "adaptive"}},
+    ]
+    folders = [tmp_path / "alone" / "run", tmp_path / "together" / "run"]
+    for folder, executor in zip(folders, (None, Processes(2, threads=1)), strict=True):
+        folder.parent.mkdir()
+        record = run(rows, logs, folder, executor)
+        assert [row.failure for row in record.rows] == [None, None]
+    for result_id in (row.results[0] for row in record.rows):
+        sums = [results.read_sums(results.result_folder(folder, result_id), "iou", "all") for folder in folders]
+        np.testing.assert_array_equal(*sums)
