@@ -55,7 +55,7 @@ class Certainty(nn.Module):
 def _answers(
     probabilities: Callable[[WindowBatch], Tensor], windows: WindowSet
 ) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
-    """Give of the cells outside M the highest probability's logit, its class, and whether that is right: (K,) each."""
+    """Return the highest probability's logit of the cells outside M, its class, and whether it is right: (K,) each."""
     count = min(FITTED_WINDOWS, len(windows))
     chosen = torch.linspace(0, len(windows) - 1, count).round().long().to(windows.inputs.device)
     for part in torch.split(chosen, _BATCH):

@@ -110,15 +110,25 @@ class Row(Config):
         if self.stream is None:
             return
         if self.stream.recorded != (self.answers_in is not None):
-            raise ValueError("stream.recorded: true where answers and their times lie in logs, and there alone")
+            raise ValueError("stream.recorded: true is for model: log, which needs it")
         if self.disturb is not None or self.second_target is not None:
             raise ValueError("stream: a stream has neither disturbed inputs nor a second target")
         if self.asked is not None and self.stream.asked != "exact":
             raise ValueError("stream.asked: what is told of the truth answers for each time of evaluation: exact")
         model, asked = self.found_model(), self.stream.asked
+        if asked == "capture" and model is not None and not model.baseline and not self.stream.recorded:
+            raise ValueError("stream.asked: capture is for what predicts nothing; ask a network fixed or adaptive")
+        if asked == "fixed" and model is not None:
+            self._check_fixed_lead(*model.leads_s)
         one_lead = model is not None and model.learns() and not model.any_lead and self.train_leads is None
-        if one_lead and asked not in ("capture", "fixed"):
+        if one_lead and asked != "fixed":
             raise ValueError(f"stream.asked: {asked} needs a model that answers any lead, and this one learns one")
+
+    def _check_fixed_lead(self, shortest_s: float, longest_s: float) -> None:
+        lead_ms = self.scored_window.lead_ms
+        if lead_ms is not None and not shortest_s <= lead_ms / 1000 <= longest_s:
+            text = f"{1000 * shortest_s:.0f} to {1000 * longest_s:.0f} ms"
+            raise ValueError(f"window.lead_ms: {lead_ms:g} is not one of the leads that {self.model} answers, {text}")
 
     @property
     def scored_window(self) -> WindowConfig:
@@ -193,7 +203,7 @@ class Row(Config):
         words = self.stream.model_copy(update={"added_ms": 0.0}).words
         stream = self.stream
         asked, measured = "recorded" if stream.recorded else stream.asked, stream.latency_ms is None
-        return StreamFacts(words=words, added_ms=stream.added_ms, measured=measured, asked=asked)
+        return StreamFacts(words=words, added_ms=stream.added_ms, measured=measured, moved=stream.move, asked=asked)
 
     @property
     def label(self) -> str:
@@ -210,7 +220,8 @@ class Row(Config):
         if self.disturb:
             parts.append(self.disturb.words)
         if self.stream:
-            parts[1:] = [*self._inputs_in_words[1:], self.stream.words]
+            ahead = parts[-1:] if self.stream.asked == "fixed" else []
+            parts[1:] = [*self._inputs_in_words, *ahead, self.stream.words]
         return f"{self.name} ({', '.join(parts)})"
 
     @property

@@ -91,11 +91,11 @@ def stream_record(plan: StreamPlan) -> StreamRecord:
     return StreamRecord(
         evaluations=len(plan.used),
         misses=int((~there).sum()),
-        answers=plan.made,
+        answers=len(plan.took_ns),
         first_answer_ms=round(float(plan.first_answer_ns.max()) / _MS, 3),
         age_ms=_median(age_ms),
         oldest_ms=_percentile(age_ms, 99),
-        latency_ms=_median((plan.publish_ns - plan.begin_ns) / _MS),
+        latency_ms=_median(plan.took_ns / _MS),
         lead_ms=_median((plan.for_ns[used] - plan.capture_ns[used]) / _MS),
     )
 

@@ -11,6 +11,7 @@ class StreamFacts(Config):
     words: str  # in words, without what is added to the latency
     added_ms: float  # on top of the latency of its chain
     measured: bool  # whether its latency was measured, by a profile or by who made the answers
+    moved: bool  # whether answers are moved along with the vehicle
     asked: str  # the time that a grid is for, as `streams.config` names it
 
 

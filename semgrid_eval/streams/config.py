@@ -35,8 +35,7 @@ class StreamConfig(Config):
     added_ms: float = Field(0.0, ge=0, le=60_000)
     workers: Worker = "one"  # one is busy while it works; `many` begin with every frame
     rule: Rule = "newest"  # when one worker begins: at once with the newest frame, or by sAP's shrinking tail
-    # The time that a grid is for.
-    asked: Asked = "capture"
+    asked: Asked = "capture"  # the time that a grid is for
     move: bool = True  # whether grids are brought to the vehicle's position at the time of evaluation
     rate_hz: float | None = Field(None, gt=0, le=1000)  # of evaluation; at the capture of every frame if not given
     seed: int = Field(0, ge=0)  # of what is drawn

@@ -20,6 +20,7 @@ class Drive(NamedTuple):
     evaluated_ns: Times
     used: NDArray[np.int64]
     lead_frames: int  # of a network with a fixed lead
+    one_worker: bool = True  # who begins with no frame before the last one is done
 
 
 def times_asked(asked: Asked, answers: Answers, drive: Drive, limits_ns: tuple[int, int]) -> Times:
@@ -56,7 +57,10 @@ def _known(answers: Answers, drive: Drive) -> Times:
 
 
 def _adaptive(answers: Answers, drive: Drive) -> Times:
-    """When the answer will be there, and half the time until the next one is, as the last answers before it tell."""
+    """When the answer will be there, and half the time until the next one is, as the last answers before it tell.
+
+    The first answers, which have none before them, expect what the first one will take.
+    """
     order = np.argsort(answers.publish_ns, kind="stable")
     published, took = answers.publish_ns[order], (answers.publish_ns - answers.begin_ns)[order]
     spacing = period_ns(drive.captures_ns)
@@ -64,8 +68,9 @@ def _adaptive(answers: Answers, drive: Drive) -> Times:
     for number, begin_ns in enumerate(answers.begin_ns):
         known = int(np.searchsorted(published, begin_ns, side="right"))
         seen = slice(max(0, known - REMEMBERED), known)
-        latency = int(took[seen].mean()) if known else 0
-        between = int(np.diff(published[seen]).mean()) if known > 1 else spacing
+        latency = int(took[seen].mean()) if known else int(took[0])
+        usual = max(spacing, latency) if drive.one_worker else spacing
+        between = int(np.diff(published[seen]).mean()) if known > 1 else usual
         found[number] = begin_ns + latency + between // 2
     return found
 

@@ -42,7 +42,7 @@ class StreamPlan:
     evaluated: NDArray[np.int64]  # (E,) frames
     used: NDArray[np.int64]  # (E,) the answer, or `NONE`
     first_answer_ns: Times  # (R,) from each recording's first frame to its first answer; that to its end where none is
-    made: int  # answers, with those that were never the newest at a time of evaluation
+    took_ns: Times  # (A,) from begin to publication of all answers, with those that are never used
 
     def blocks(self) -> NDArray[np.int64]:
         """Number the block that each evaluation is counted in: (E,) from 0, recording by recording."""
@@ -55,7 +55,7 @@ class StreamPlan:
     def digest(self) -> str:
         """Digest what determines every number, given how logs become grids and the model."""
         total = hashlib.sha256(self.answers.digest().encode())
-        for part in (self.for_ns, self.capture_ns, self.publish_ns, self.evaluated, self.used):
+        for part in (self.for_ns, self.capture_ns, self.begin_ns, self.publish_ns, self.evaluated, self.used):
             total.update(repr(part.shape).encode() + part.tobytes())
         return total.hexdigest()[:DIGEST_CHARACTERS]
 
@@ -125,7 +125,7 @@ def plan_stream(
         evaluated=np.concatenate([part.evaluated for part in parts]),
         used=np.concatenate(used),
         first_answer_ns=np.array([part.first_answer_ns for part in parts], np.int64),
-        made=sum(len(part.answers.frame) for part in parts),
+        took_ns=np.concatenate([part.answers.publish_ns - part.answers.begin_ns for part in parts]),
     )
 
 
@@ -164,7 +164,7 @@ class _Part:
         used = newest_at(evaluated_ns, self._capture_ns, self.answers.publish_ns, told_ns)
         window = how.window
         lead = window.lead_frames if window.lead_ms is None else frames_of(window.lead_ms, self._stamps_ns)
-        drive = Drive(self._stamps_ns, evaluated_ns, used, lead)
+        drive = Drive(self._stamps_ns, evaluated_ns, used, lead, config.workers == "one")
         for_ns = times_asked(config.asked, self.answers, drive, how.limits_ns) if told_ns is None else told_ns
         answered = self.answers.publish_ns.min(initial=int(self._stamps_ns[-1]))
         self.first_answer_ns = int(answered) - int(self._stamps_ns[0])

@@ -49,7 +49,7 @@ def one_worker(captures_ns: Times, latencies_ns: Times, first: int, rule: Rule =
 
     By `shrinking_tail` it also waits for the next frame where beginning at once would leave, in the end, a smaller part
     of a frame's time than has passed since the newest capture: the answer would be based on an older frame for nothing.
-    It expects the mean latency.
+    It expects the mean latency of the recording.
 
     Args:
         captures_ns: (F,) captures of the frames, ascending.
@@ -58,15 +58,15 @@ def one_worker(captures_ns: Times, latencies_ns: Times, first: int, rule: Rule =
         rule: when to begin.
     """
     count, found = len(captures_ns), list[tuple[int, int, int]]()
-    period_ns = float(np.median(np.diff(captures_ns))) if count > 1 else 1.0
-    expected_ns = float(latencies_ns.mean()) if count else 0.0
+    period_ns = max(1, round(float(np.median(np.diff(captures_ns))))) if count > 1 else 1
+    expected_ns = round(float(latencies_ns.mean())) if count else 0
     free_ns, following = 0, first
     while following < count:
         begin_ns = max(free_ns, int(captures_ns[following]))
         frame = int(np.searchsorted(captures_ns, begin_ns, side="right")) - 1
         if rule == "shrinking_tail" and frame + 1 < count:
-            tail = (begin_ns - int(captures_ns[frame])) / period_ns
-            if (tail + expected_ns / period_ns) % 1.0 < tail % 1.0:
+            tail_ns = begin_ns - int(captures_ns[frame])
+            if (tail_ns + expected_ns) % period_ns < tail_ns % period_ns:
                 frame += 1
                 begin_ns = int(captures_ns[frame])
         free_ns = begin_ns + int(latencies_ns[frame])

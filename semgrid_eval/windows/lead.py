@@ -26,7 +26,9 @@ def lead_from(value: object) -> object:
     """
     if not (isinstance(value, str) and value.startswith(_FROM)):
         return value
-    file, _, category = value.removeprefix(_FROM).partition(":")
+    file, category = value.removeprefix(_FROM), ""
+    if not Path(file).is_file():
+        file, _, category = file.rpartition(":") if ":" in file else (file, "", "")
     try:
         found = parse_config(BestLeads, read_json(Path(file)), path=file).lead_ms
     except (InputError, OSError) as error:

@@ -116,6 +116,12 @@ def test_the_page_shows_strategies_and_the_best_lead_can_be_taken(done, tmp_path
         ({"stream": {"latency_ms": 1}, "second_target": "expected"}, "neither disturbed inputs nor a second target"),
         ({"model": "ceiling", "stream": {"latency_ms": 1}}, "answers for each time of evaluation: exact"),
         ({"model": "ed", "stream": {"latency_ms": 1, "asked": "known"}}, "needs a model that answers any lead"),
+        ({"model": "residual-town", "stream": {"latency_ms": 1}}, "capture is for what predicts nothing"),
+        (
+            {"model": "residual-town", "window": {"lead_ms": 2000}, "stream": {"latency_ms": 1, "asked": "fixed"}},
+            "2000 is not one of the leads that residual-town answers, 59 to 1250 ms",
+        ),
+        ({"stream": {"recorded": True}}, "is for model: log"),
         ({"window": {"lead_ms": 100, "horizon_steps": 2}}, "give one of lead_ms and horizon_steps"),
         ({"window": {"lead_ms": "from nowhere.json"}}, "nowhere.json"),
     ],

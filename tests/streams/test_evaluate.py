@@ -128,11 +128,22 @@ def test_grids_are_asked_for_the_middle_of_their_use_when_that_is_known(data):
         assert plan.for_ns[number] == times[(len(times) - 1) // 2]
 
 
-def test_the_first_answers_are_asked_for_what_no_past_tells_and_later_ones_for_what_it_does(data):
-    plan = plan_of(data, late=4, asked="adaptive")
+@pytest.mark.parametrize(("workers", "spacing"), [("many", 1), ("one", 4)])
+def test_answers_are_asked_for_the_middle_of_the_time_in_which_past_ones_were_the_newest(data, workers, spacing):
+    """The first ones, which have no past, take the latency of the first for theirs."""
+    plan = plan_of(data, late=4, asked="adaptive", workers=workers)
     leads = (plan.for_ns - plan.capture_ns) / FRAME_NS
-    assert leads[0] == pytest.approx(0.5, abs=1e-6)
-    assert leads[-1] == pytest.approx(4.5, abs=1e-6)
+    np.testing.assert_allclose(leads, 4 + spacing / 2, atol=1e-6)
+
+
+def test_an_adaptive_stream_learns_what_its_answers_take(data):
+    """From the sixth frame on everything takes 6 frames instead of 2; ten answers later that is all it remembers."""
+    took = lambda name, count: np.where(np.arange(count) < 6, 2, 6) * FRAME_NS  # noqa: E731
+    plan = plan_of(data, late=0, asked="adaptive", latencies=took)
+    leads = ((plan.for_ns - plan.capture_ns) / FRAME_NS)[: FRAMES - 8]
+    assert leads[0] == pytest.approx(2.5)
+    assert leads[-1] > 4
+    assert (np.diff(leads) > -0.5).all()
 
 
 def test_leads_stay_within_what_a_network_can_be_asked_for(data):

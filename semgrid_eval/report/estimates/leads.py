@@ -42,12 +42,14 @@ def lead_series(scores: Scores) -> list[LeadSeries]:
     """Group streams by all but their lead, those whose latency was measured first; groups of one lead are left out."""
     groups: dict[object, list[RowScores]] = {}
     for entry in scores.values():
-        if entry.row.is_stream and entry.row.record.facts.lead_ms is not None:
+        facts = entry.row.record.facts
+        if facts.stream is not None and facts.stream.asked == "fixed" and facts.lead_ms is not None:
             groups.setdefault((entry.row.run, settings_but(entry.row, "lead_ms")), []).append(entry)
     found = [LeadSeries(tuple(sorted(each, key=lead_of))) for each in groups.values() if len(each) > 1]
     return sorted(found, key=lambda series: not facts_of(series.entries[0].row).measured)
 
 
 def best_leads(found: Sequence[LeadSeries]) -> dict[str, float]:
-    """Return the best lead in ms of the first series by category; nothing where there is no series."""
-    return {column: found[0].best(column)[1].value for column in DIFFERENCE_COLUMNS} if found else {}
+    """Return the best lead in ms of the first series, for each category that has values; nothing without a series."""
+    best = {column: found[0].best(column) for column in DIFFERENCE_COLUMNS} if found else {}
+    return {column: lead.value for column, (entry, lead) in best.items() if np.isfinite(entry.mean[column])}

@@ -50,7 +50,7 @@ class Strategy:
         """Say at which delay it falls to a value, in ms: between rows on a straight line, NaN outside of its rows."""
         spans = zip(pairwise(self.delays_ms), pairwise(self.values(column)), strict=True)
         for (start, end), (high, low) in spans:
-            if high >= value >= low:
+            if start > 0 and high >= value >= low:  # from no delay to the first, the age jumps by a whole frame
                 return start if high == low else start + (end - start) * (high - value) / (high - low)
         return float("nan")
 
@@ -89,7 +89,7 @@ def _strategy(entries: Sequence[RowScores]) -> Strategy:
 def plain_strategy(found: Sequence[Strategy]) -> Strategy | None:
     """Choose what predictions are measured against: the newest grid as it is, moved along rather than not."""
     plain = [each for each in found if facts_of(each.measured.row).asked == "capture" and _is_lowest(each)]
-    return max(plain, key=lambda each: "not moved" not in facts_of(each.measured.row).words, default=None)
+    return max(plain, key=lambda each: facts_of(each.measured.row).moved, default=None)
 
 
 def _is_lowest(strategy: Strategy) -> bool:
@@ -114,6 +114,9 @@ def warm_up(runs: Sequence[Run]) -> Division:
     rows = [row for run in runs for row in run.rows if row.results and row.is_stream]
     slowest_ms: dict[str, float] = {}
     for row in rows:
+        went = record_of(row)
+        if went.misses == went.evaluations:  # it never answers
+            continue
         first_ms = max(result.record.stream.first_answer_ms for result in row.results if result.record.stream)
         slowest_ms[row.targets] = max(slowest_ms.get(row.targets, 0.0), first_ms)
     starts: dict[tuple[Path, str], NDArray[np.int64]] = {}
@@ -124,7 +127,7 @@ def warm_up(runs: Sequence[Run]) -> Division:
         key = (row.run, result.record.id)
         if key not in starts:
             starts[key] = _since_start_ns(result)
-        return np.where(starts[key] >= slowest_ms[row.targets] * 1e6, 0, -1)
+        return np.where(starts[key] >= slowest_ms.get(row.targets, 0.0) * 1e6, 0, -1)
 
     return of_windows("warm_up", (WARM,), "of streams, " + WARM, {"iou": ("mean_known",)}, number)
 

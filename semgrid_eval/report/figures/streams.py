@@ -14,7 +14,8 @@ from semgrid_eval.report.rows.pairing import HEADLINE
 
 _CAPTION = (
     "Streaming IoU by the delay of answers: median time from the beginning of the work on a frame to its answer; large "
-    "marks are at the latency that was measured. Bands are 95% intervals; broken lines are bounds. "
+    "marks are at the latency that was measured. Bands are 95% intervals; broken lines are "
+    "bounds, which know when answers will be used. Misses before the first answer count. "
 )
 STREAM_COLUMNS = ("row", "strategy", "added_ms", "delay_ms", "age_ms", "lead_ms", "misses", "evaluations")
 
@@ -76,4 +77,4 @@ def _draw(axes: Axes, strategy: Strategy, scores: Scores, column: str, index: in
 
 
 def _is_bound(entry: RowScores) -> bool:
-    return entry.row.uses_truth or facts_of(entry.row).asked == "exact"
+    return entry.row.uses_truth or entry.row.is_oracle

@@ -110,6 +110,11 @@ class Row:
         return self.record.facts.stream is not None
 
     @property
+    def is_oracle(self) -> bool:
+        """Whether it is a stream that knows when its answers will be used, as nobody does."""
+        return self.record.facts.stream is not None and self.record.facts.stream.asked in ("known", "exact")
+
+    @property
     def targets(self) -> str:
         """The comparability key of its results; empty where there is none."""
         return self.results[0].record.targets if self.results else ""

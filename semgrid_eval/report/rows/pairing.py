@@ -48,7 +48,7 @@ def reference_of(row: Row, rows: Sequence[Row]) -> Row | None:
         return None
     baselines = (other for other in rows if other.is_baseline and other.run == row.run and comparable(row, other))
     alike = (other for other in baselines if other.disturbed == row.disturbed)
-    choices = [other for other in alike if _frames_ahead(other) == _frames_ahead(row)]
+    choices = [other for other in alike if row.is_stream or _frames_ahead(other) == _frames_ahead(row)]
     return max(choices, key=lambda other: _nearness(row, other), default=None)
 
 
@@ -67,6 +67,8 @@ def way_of(row: Row, rows: Sequence[Row]) -> tuple[Row, Row] | None:
     Both are of the same run, have the same targets and look as many frames ahead. None for such rows themselves, and
     where an end is missing.
     """
+    if row.is_stream:  # its delay is part of what it is: `report.tables.streams` compares streams
+        return None
     alike = [other for other in rows_alike(row, rows) if not other.disturbed]
     # The mask M depends on inputs, so an end that sees the same ones is nearer; of several, the first is taken.
     highest = [other for other in alike if other.record.facts.bound == "upper"]
@@ -85,7 +87,7 @@ def rows_alike(row: Row, rows: Sequence[Row]) -> list[Row]:
 def headline(scores: Scores) -> Headline | None:
     """Find the best row among those that answer the main question; None where nothing is scored."""
     finite = (entry.row for entry in scores.values() if np.isfinite(entry.mean[HEADLINE]))
-    rows = [row for row in finite if not row.uses_truth]
+    rows = [row for row in finite if not row.uses_truth and not row.is_oracle]
     if not rows:
         return None
     group = main_group(rows)
@@ -116,7 +118,8 @@ def _nearness(row: Row, other: Row) -> tuple[bool, ...]:
     """Order baselines by how much of the row's question they share."""
     mine, theirs = row.record.facts, other.record.facts
     shared = (mine.sensors == theirs.sensors, mine.translate == theirs.translate, mine.inputs == theirs.inputs)
-    return (*shared, mine.step_frames == theirs.step_frames, not theirs.learns)
+    plain = theirs.stream is None or (theirs.stream.moved and theirs.bound == "lower")
+    return (*shared, mine.step_frames == theirs.step_frames, not theirs.learns, plain)
 
 
 def settings_of(row: Row) -> Mapping[str, object]:

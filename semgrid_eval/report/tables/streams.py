@@ -26,7 +26,7 @@ _LEADS = (
 )
 _WINS = (
     "What each strategy wins over {plain} at its own latency: paired differences of streaming IoU, and for how many ms "
-    "it may work longer than {plain} and still have the same mean."
+    "it may work longer than {plain} and still have the same mean. Misses before the first answer count."
 )
 
 
@@ -69,7 +69,7 @@ def wins_table(found: Sequence[Strategy]) -> Table | None:
     others = [each for each in found if plain and each is not plain and _same(each, plain)]
     if plain is None or not others:
         return None
-    columns = tuple([(LABELS[column], "") for column in _COLUMNS] + [("Time", "ms")])
+    columns = tuple([(LABELS[column], "") for column in _COLUMNS] + [("Won", "ms")])
     bodies = tuple((_wins(each, plain),) for each in others)
     return Table("stream-wins", _WINS.replace("{plain}", plain.name), "Strategies", columns, bodies)
 
@@ -129,16 +129,20 @@ def stream_sentence(found: Sequence[Strategy]) -> str:
     gain, won = best.measured.minus(plain.measured, HEADLINE), won_ms(best, plain, HEADLINE)
     words = {"gain": "better", "loss": "worse", "open": "not clearly different"}[verdict(gain)]
     first = (
-        f"{best.name}, whose answers come {best.delay_ms:.0f} ms late, has a mean streaming IoU of "
-        f"{number(best.measured.mean[HEADLINE])}; {plain.name}, {plain.delay_ms:.0f} ms late, "
+        f"{best.name}, whose chain takes {best.delay_ms:.0f} ms, has a mean streaming IoU of "
+        f"{number(best.measured.mean[HEADLINE])}; {plain.name}, with {plain.delay_ms:.0f} ms, "
         f"{number(plain.measured.mean[HEADLINE])}: {signed(gain.value)}, {words} "
         f"({interval_phrase(gain, with_sign=True)})"
     )
     if not math.isfinite(won.value):
         return f"{first}."
     as_late = best.delay_ms - won.value
-    return f"{first}. {plain.name} would be as good {as_late:.0f} ms late."
+    return f"{first}. {plain.name} would be as good with {as_late:.0f} ms."
 
 
 def _predicts(strategy: Strategy) -> bool:
-    return facts_of(strategy.measured.row).asked in ("fixed", "adaptive", "known")
+    """Tell whether it is a prediction that anybody could make, with a lead that was not chosen on what is scored."""
+    facts = strategy.measured.row.record.facts
+    return facts_of(strategy.measured.row).asked == "adaptive" or (
+        facts_of(strategy.measured.row).asked == "fixed" and facts.lead_ms is None
+    )
