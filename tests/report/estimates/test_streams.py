@@ -11,6 +11,7 @@ from support.scoring import score_rows
 from semgrid_eval.report.estimates.leads import best_leads, lead_series
 from semgrid_eval.report.estimates.streams import plain_strategy, strategies, warm_up, won_ms
 from semgrid_eval.report.figures.streams import stream_frame, stream_plots
+from semgrid_eval.report.rows.pairing import headline, reference_of, way_of
 from semgrid_eval.report.tables.streams import stream_sentence, stream_table, wins_table
 from semgrid_eval.scores.facts import StreamFacts, StreamRecord
 from semgrid_eval.scores.metrics.table import IOU
@@ -142,3 +143,34 @@ def test_the_warm_up_ends_with_the_first_answer_of_the_slowest_strategy():
         assert (sums > 0).tolist() == [False, False, True, True, True, True] * 2
     plain = counted_row("BL-DC", {"road": [1] * 12})
     assert division.sums(plain, plain.results[0], IOU) is None
+
+
+def test_a_stream_is_measured_against_the_newest_grid_that_moves_along_and_no_oracle_is_best():
+    still = stream("BL-still", 40, delay=200.0, measured=True, moved=False)
+    found = [
+        still,
+        stream("BL-newest", 60, delay=200.0, measured=True),
+        stream("RN", 70, delay=220.0, measured=True, asked="adaptive"),
+        stream("RN-known", 80, delay=220.0, measured=True, asked="known"),
+        stream("RN-fixed", 65, delay=220.0, measured=True, asked="fixed", lead_ms=100.0),
+    ]
+    assert {row.name: reference_of(row, found).name for row in found[2:]} == dict.fromkeys(
+        ("RN", "RN-known", "RN-fixed"), "BL-newest"
+    )
+    assert headline(scored(found)).best.name == "RN"
+    assert all(way_of(row, found) is None for row in found)
+    assert "RN, whose" in stream_sentence(strategies(scored(found)))
+
+
+def test_who_never_answers_ends_no_warm_up():
+    class Run:
+        rows = (stream("a", 50, delay=1.0), silent(stream("b", 0, delay=1.0, first=9e9)))
+
+    division = warm_up([Run])
+    assert division.sums(Run.rows[0], Run.rows[0].results[0], IOU) is not None
+
+
+def silent(row):
+    went = row.results[0].record.stream
+    record = row.results[0].record.model_copy(update={"stream": went.model_copy(update={"misses": went.evaluations})})
+    return replace(row, results=(replace(row.results[0], record=record),))
