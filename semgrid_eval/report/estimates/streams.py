@@ -96,14 +96,24 @@ def _is_lowest(strategy: Strategy) -> bool:
     return strategy.measured.row.record.facts.bound == "lower"
 
 
-def won_ms(strategy: Strategy, plain: Strategy, column: str) -> Estimate:
-    """Say how much later a strategy may answer and still be as good as another one: in ms at its own least delay.
+def won_ms(entry: RowScores, plain: Strategy, column: str) -> Estimate:
+    """Say how much longer a row's chain may take and still be as good as another strategy, in ms.
 
-    The interval takes that of the strategy's score to the other one's curve; the curve's own chance is left out.
+    The interval takes that of the row's score to the other one's curve; the curve's own chance is left out.
     """
-    score = strategy.measured.estimate(column)
+    score, delay_ms = entry.estimate(column), record_of(entry.row).latency_ms
     value, low, high = (plain.delay_with(each, column) for each in (score.value, score.low, score.high))
-    return Estimate(strategy.delay_ms - value, strategy.delay_ms - low, strategy.delay_ms - high)
+    return Estimate(delay_ms - value, delay_ms - low, delay_ms - high)
+
+
+def pairs_with(strategy: Strategy, plain: Strategy) -> list[tuple[RowScores, RowScores]]:
+    """Pair the rows of two strategies to whose latencies as much is added, from the least to the most."""
+    others = {_added(entry): entry for entry in plain.entries}
+    return [(entry, others[_added(entry)]) for entry in strategy.entries if _added(entry) in others]
+
+
+def _added(entry: RowScores) -> tuple[bool, float]:
+    return facts_of(entry.row).measured, facts_of(entry.row).added_ms
 
 
 def warm_up(runs: Sequence[Run]) -> Division:

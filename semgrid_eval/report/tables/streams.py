@@ -1,13 +1,13 @@
 """Tables of streams: every strategy at the latency that was measured, and what predictions win over the newest grid."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores, Scores
 from semgrid_eval.report.estimates.leads import LeadSeries
-from semgrid_eval.report.estimates.streams import Strategy, facts_of, plain_strategy, record_of, won_ms
+from semgrid_eval.report.estimates.streams import Strategy, facts_of, pairs_with, plain_strategy, record_of, won_ms
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, verdict
-from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, signed
+from semgrid_eval.report.tables.numbers import ABSENT, finite, interval_phrase, number, signed
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
 from semgrid_eval.report.tables.values import evidence
 
@@ -25,8 +25,9 @@ _LEADS = (
     "row's lead_ms: from REPORT/leads.json."
 )
 _WINS = (
-    "What each strategy wins over {plain} at its own latency: paired differences of streaming IoU, and for how many ms "
-    "it may work longer than {plain} and still have the same mean. Misses before the first answer count."
+    "What each strategy wins over {plain} with as much added to its latency: paired differences of streaming IoU, and "
+    "how many ms longer than that of {plain} its chain may take and still give the same mean. Misses before the first "
+    "answer count."
 )
 
 
@@ -66,12 +67,13 @@ def _ms(value: float, note: str = "") -> Cell:
 def wins_table(found: Sequence[Strategy]) -> Table | None:
     """Show what strategies win over the newest grid as it is; None where there is nothing to measure by."""
     plain = plain_strategy(found)
-    others = [each for each in found if plain and each is not plain and _same(each, plain)]
-    if plain is None or not others:
+    if plain is None:
         return None
+    bodies = [tuple(_wins(each, plain)) for each in found if each is not plain and _same(each, plain)]
     columns = tuple([(LABELS[column], "") for column in _COLUMNS] + [("Won", "ms")])
-    bodies = tuple((_wins(each, plain),) for each in others)
-    return Table("stream-wins", _WINS.replace("{plain}", plain.name), "Strategies", columns, bodies)
+    caption = _WINS.replace("{plain}", plain.name)
+    lines = tuple(body for body in bodies if body)
+    return Table("stream-wins", caption, f"Strategies less {plain.name}", columns, lines) if lines else None
 
 
 def _same(strategy: Strategy, other: Strategy) -> bool:
@@ -79,16 +81,20 @@ def _same(strategy: Strategy, other: Strategy) -> bool:
     return mine.row.run == theirs.row.run and mine.cells_key[0] == theirs.cells_key[0]
 
 
-def _wins(strategy: Strategy, plain: Strategy) -> Line:
-    entry = strategy.measured
-    cells = []
-    for column in _COLUMNS:
-        difference = entry.minus(plain.measured, column)
-        title = f"{evidence(entry, column)}; difference: {interval_phrase(difference, with_sign=True)}"
-        cells.append(difference_cell(difference, title=title))
-    cells.append(_won(won_ms(strategy, plain, HEADLINE)))
-    kind = "truth" if entry.row.uses_truth else ""
-    return Line(f"{strategy.name} {MINUS} {plain.name}", tuple(cells), kind, entry.row.record.label)
+def _wins(strategy: Strategy, plain: Strategy) -> Iterator[Line]:
+    """Compare delay by delay: the first line is the strategy's, the others belong to it."""
+    for place, (entry, other) in enumerate(pairs_with(strategy, plain)):
+        cells = []
+        for column in _COLUMNS:
+            difference = entry.minus(other, column)
+            title = f"{evidence(entry, column)}; difference: {interval_phrase(difference, with_sign=True)}"
+            cells.append(difference_cell(difference, title=title))
+        cells.append(_won(won_ms(entry, plain, HEADLINE)))
+        added_ms = facts_of(entry.row).added_ms
+        added = f"+{added_ms:g} ms" if added_ms else ""
+        kind = "part" if place else "truth" if entry.row.uses_truth else ""
+        header = added if place else f"{strategy.name} {added}".rstrip()
+        yield Line(header, tuple(cells), kind, entry.row.record.label)
 
 
 def _won(won: Estimate) -> Cell:
@@ -126,7 +132,7 @@ def stream_sentence(found: Sequence[Strategy]) -> str:
     if plain is None or not predicted:
         return ""
     best = max(predicted, key=lambda each: each.measured.mean[HEADLINE])
-    gain, won = best.measured.minus(plain.measured, HEADLINE), won_ms(best, plain, HEADLINE)
+    gain, won = best.measured.minus(plain.measured, HEADLINE), won_ms(best.measured, plain, HEADLINE)
     words = {"gain": "better", "loss": "worse", "open": "not clearly different"}[verdict(gain)]
     first = (
         f"{best.name}, whose chain takes {best.delay_ms:.0f} ms, has a mean streaming IoU of "
