@@ -207,8 +207,8 @@ def test_another_grid_is_refused(exported, logs, tmp_path):
 @pytest.mark.parametrize(
     ("row", "fault"),
     [
-        ({"stream": {"latency_ms": 100}}, "stream.recorded: true where answers and their times lie in logs"),
-        ({"model": "newest", "settings": {}, "stream": {"recorded": True}}, "stream.recorded: true where answers"),
+        ({"stream": {"latency_ms": 100}}, "stream.recorded: true is for model: log"),
+        ({"model": "newest", "settings": {}, "stream": {"recorded": True}}, "stream.recorded: true is for model: log"),
         ({"stream": {"recorded": True, "latency_ms": 1}}, "give one of latency_ms, profile and recorded: true"),
         (
             {"stream": {"recorded": True, "workers": "many"}},

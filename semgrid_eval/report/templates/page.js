@@ -96,11 +96,18 @@ const element = (kind, properties, ...children) => {
     cell.append(copy);
   }
 
+  const sized = new ResizeObserver((entries) => {
+    for (const canvas of new Set(entries.map((entry) => entry.target.closest(".canvas")))) {
+      if (canvas.scrollWidth > canvas.clientWidth) {
+        canvas.tabIndex = 0; // what scrolls must be reached by keyboard, too
+        canvas.setAttribute("role", "region");
+        canvas.setAttribute("aria-label", canvas.firstElementChild.alt);
+      } else for (const name of ["tabindex", "role", "aria-label"]) canvas.removeAttribute(name);
+    }
+  });
   for (const canvas of document.querySelectorAll(".canvas")) {
-    if (canvas.scrollWidth <= canvas.clientWidth) continue;
-    canvas.tabIndex = 0; // what scrolls must be reached by keyboard, too
-    canvas.setAttribute("role", "region");
-    canvas.setAttribute("aria-label", canvas.firstElementChild.alt);
+    sized.observe(canvas);
+    sized.observe(canvas.firstElementChild); // a picture has its size when it is there
   }
 
   const links = new Map([...document.querySelectorAll("nav a")].map((link) => [link.hash.slice(1), link]));

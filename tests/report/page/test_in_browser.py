@@ -11,6 +11,7 @@ import pytest
 from semgrid_eval.classes import MASK_COLOUR, class_palette
 
 webdriver = pytest.importorskip("selenium.webdriver", reason="Selenium is not installed (pip install selenium)")
+wait = pytest.importorskip("selenium.webdriver.support.wait")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
 pytestmark = pytest.mark.skipif(
@@ -129,9 +130,12 @@ def test_a_wide_figure_is_reached_by_keyboard_on_a_phone(browser, page):
     return [...document.querySelectorAll('.canvas')].map(each =>
       [each.scrollWidth > each.clientWidth, each.tabIndex === 0 && each.ariaLabel.length > 20]);
     """
-    canvases = browser.execute_script(script)
-    assert any(scrolls for scrolls, _ in canvases)
-    assert all(scrolls == reached for scrolls, reached in canvases)
+
+    def reached(driver):
+        canvases = driver.execute_script(script)
+        return any(scrolls for scrolls, _ in canvases) and all(scrolls == reached for scrolls, reached in canvases)
+
+    wait.WebDriverWait(browser, 60).until(reached)  # pictures come one by one
 
 
 def test_a_click_sorts_and_another_turns_the_order(opened):

@@ -53,6 +53,7 @@ def test_every_division_has_the_tables_that_it_shows(run):
         "distance": ["distance", "distance-differences"],
         "origin": ["origin-accuracy", "origin-accuracy-differences"],
         "paces": [],
+        "warm_up": [],
     }
 
 

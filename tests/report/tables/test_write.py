@@ -73,7 +73,7 @@ def test_what_a_clock_measured_stands_apart_from_what_comes_out_the_same_again(p
     assert timings[(timings.row == "ED-DC") & (timings.of == "training")].seconds.tolist() == [80.0, 81.0, 82.0]
     assert timings[timings.of == "prediction"].seconds.eq(1.25).all()
     for path in page.parent.glob("*.csv"):
-        if path.name != "timings.csv":
+        if path.name not in ("timings.csv", "streams.csv"):  # what streams say is drawn, or recorded
             columns = pd.read_csv(path).columns
             assert not [name for name in columns if "seconds" in name or name.endswith("_ms")], path.name
 
