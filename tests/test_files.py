@@ -2,6 +2,7 @@ import errno
 import hashlib
 import os
 import resource
+from contextlib import contextmanager
 
 import pytest
 
@@ -55,18 +56,21 @@ def test_a_missing_input_read_while_writing_names_the_input(tmp_path, output):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.fixture
+@contextmanager
 def little_room():
-    """Files of this process can have 4 KiB at most."""
+    """Let files of this process have 4 KiB at most: inside the test alone, since pytest may write to a file as well."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.mark.parametrize("size", [5000, 1 << 20])  # written by the flush at the end, or at once
-def test_a_write_that_fails_names_the_output(tmp_path, little_room, size):
+def test_a_write_that_fails_names_the_output(tmp_path, size):
     with (
+        little_room(),
         pytest.raises(InputError, match=r"out: cannot be written: File too large$") as raised,
         atomic_file(tmp_path / "out") as stream,
     ):
