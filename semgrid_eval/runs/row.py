@@ -210,18 +210,11 @@ class Row(Config):
         """Name and, in words, what the row does; the horizon is always said (reading 2)."""
         found = self.found_model()
         horizon, lead_ms = self.scored_window.horizon_steps, self.scored_window.lead_ms
-        parts = [
-            found.in_words(found.parse_settings(self.settings)) if found else self.model,
-            *self._inputs_in_words,
-            f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead"
-            if lead_ms is None
-            else f"{lead_ms:g} ms ahead",
-        ]
-        if self.disturb:
-            parts.append(self.disturb.words)
-        if self.stream:
-            ahead = parts[-1:] if self.stream.asked == "fixed" else []
-            parts[1:] = [*self._inputs_in_words, *ahead, self.stream.words]
+        steps = f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead"
+        parts = [found.in_words(found.parse_settings(self.settings)) if found else self.model, *self._inputs_in_words]
+        if self.stream is None or self.stream.asked == "fixed":
+            parts.append(steps if lead_ms is None else f"{lead_ms:g} ms ahead")
+        parts += [each.words for each in (self.disturb, self.stream) if each]
         return f"{self.name} ({', '.join(parts)})"
 
     @property

@@ -122,11 +122,12 @@ def unseen_truth(data: GridData, frames: NDArray[np.int64]) -> NDArray[np.bool_]
 
 
 class _Predictions:
-    """The answers of a model, predicted in batches in the order of their use and forgotten afterwards."""
+    """The answers of a model, predicted in batches in the order of their use, which never turns back, and forgotten."""
 
     def __init__(self, model: Model, plan: StreamPlan, batch: int, shown: FirstRecording) -> None:
         self._model, self._plan, self._batch, self._shown = model, plan, batch, shown
-        self._first, self._held = 0, None  # type: tuple[int, tuple[Grids, Grids] | None]
+        self._first = 0  # number of the first answer that is held
+        self._held: list[tuple[Grids, Grids]] = []
         self.seconds = 0.0
 
     def at(self, used: NDArray[np.int64], frames: NDArray[np.int64], *, move: bool) -> tuple[Grids, Grids]:
@@ -145,27 +146,14 @@ class _Predictions:
         return prediction, certainty
 
     def _answers(self, numbers: NDArray[np.int64]) -> tuple[Grids, Grids]:
-        """Predict a range that holds these answers; those of the range before are used again."""
+        """Return some answers; those from the first of them on stay at hand, and what is missing there is predicted."""
         first, last = int(numbers.min()), int(numbers.max())
-        if self._held is None or first < self._first or last >= self._first + len(self._held[0]):
-            found = []
-            kept = self._kept_from(first)
-            begin = first + (0 if kept is None else len(kept[0]))
-            for start in range(begin, last + 1, self._batch):
-                seen = self._plan.answers.batch(slice(start, min(start + self._batch, last + 1)))
-                answer = answered(self._model, seen)
-                self.seconds += answer.seconds
-                self._shown.answer(answer.prediction, answer.certainty)
-                found.append((answer.prediction, answer.certainty))
-            parts = ([] if kept is None else [kept]) + found
-            self._first = first
-            self._held = tuple(np.concatenate(column) for column in zip(*parts, strict=True))  # type: ignore[assignment]
-        assert self._held is not None
-        classes, levels = (each[numbers - self._first] for each in self._held)
-        return classes, levels
-
-    def _kept_from(self, first: int) -> tuple[Grids, Grids] | None:
-        if self._held is None or not self._first <= first < self._first + len(self._held[0]):
-            return None
-        classes, levels = (each[first - self._first :] for each in self._held)
-        return classes, levels
+        self._first, self._held = first, self._held[first - self._first :]
+        for start in range(first + len(self._held), last + 1, self._batch):
+            seen = self._plan.answers.batch(slice(start, min(start + self._batch, last + 1)))
+            answer = answered(self._model, seen)
+            self.seconds += answer.seconds
+            self._shown.answer(answer.prediction, answer.certainty)
+            self._held += zip(answer.prediction, answer.certainty, strict=True)
+        classes, levels = zip(*(self._held[number - first] for number in numbers), strict=True)
+        return np.stack(classes), np.stack(levels)

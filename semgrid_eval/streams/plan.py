@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
@@ -13,8 +12,8 @@ from semgrid_eval.files import DIGEST_CHARACTERS
 from semgrid_eval.streams.config import StreamConfig
 from semgrid_eval.streams.leads import Drive, times_asked
 from semgrid_eval.streams.schedule import NONE, Answers, Recorded, Times, many_workers, newest_at, one_worker
-from semgrid_eval.windows.data import WindowSet
-from semgrid_eval.windows.grids import GridData, shift_in_cells
+from semgrid_eval.windows.data import Targets, WindowSet, windows_at
+from semgrid_eval.windows.grids import GridData
 from semgrid_eval.windows.lead import frames_of
 from semgrid_eval.windows.plan import WindowConfig
 
@@ -32,7 +31,7 @@ RecordedOf = Callable[[str], Recorded]
 class StreamPlan:
     """E times of evaluation with the answers used there, and these as windows of K answers; frames lie along F."""
 
-    answers: WindowSet  # (K) what the model is asked, in the order of recordings and captures
+    answers: WindowSet  # (K) what the model is asked, in the order of recordings and of their use
     numbers: NDArray[np.int64]  # (K,) place of each among all answers that its recording has
     target_m: NDArray[np.float64]  # (K, 2) position of the vehicle at the time that each answer is for
     for_ns: Times  # (K,)
@@ -101,19 +100,8 @@ def plan_stream(
     offsets = np.arange(-window.span_frames, 1, window.step_frames)
     first_frames = data.first_frames[data.locate(frames)[0]]  # which only recorded answers can reach back before
     inputs = np.maximum(frames[:, None] + offsets, first_frames[:, None])
-    device = data.grids.device
-    moved_m = target_m[:, None] - data.position_m[inputs]
-    lead_ns = for_ns[:, None] - data.stamps_ns[inputs]
-    answers = WindowSet(
-        data=data,
-        sensors=tuple(sensors),
-        sensor_rows=torch.tensor([data.sensor_index(name) for name in sensors], device=device),
-        translate=translate,
-        inputs=torch.from_numpy(inputs).to(device),
-        target_frames=torch.from_numpy(target_frames).to(device),
-        shift_cells=torch.from_numpy(shift_in_cells(moved_m, data.cell_m)).to(device),
-        lead_s=torch.from_numpy((lead_ns * 1e-9).astype(np.float32)).to(device),
-    )
+    at = Targets(target_frames, target_m, for_ns)
+    answers = windows_at(data, inputs, at, sensors=sensors, translate=translate)
     return StreamPlan(
         answers=answers,
         numbers=numbers,
@@ -172,9 +160,10 @@ class _Part:
             self.kept, self.used = used[used >= 0], np.where(used >= 0, np.cumsum(used >= 0) - 1, NONE)
             self._for_ns = evaluated_ns[used >= 0]
         else:
-            self.kept, places = np.unique(used[used >= 0], return_inverse=True)
-            self.used = np.full(len(used), NONE)
-            self.used[used >= 0] = places
+            chosen, firsts, places = np.unique(used[used >= 0], return_index=True, return_inverse=True)
+            order = np.argsort(firsts)  # of their use: those of a log may be published in another one
+            self.kept, self.used = chosen[order], np.full(len(used), NONE)
+            self.used[used >= 0] = np.argsort(order)[places]
             self._for_ns = for_ns[self.kept]
         self.evaluated = local + self._begin
 

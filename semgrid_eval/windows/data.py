@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import torch
@@ -135,6 +135,14 @@ class WindowSet:
         return total.hexdigest()[:DIGEST_CHARACTERS]
 
 
+class Targets(NamedTuple):
+    """What N windows are to predict: a frame along F, where the vehicle is, and when."""
+
+    frames: NDArray[np.int64]  # (N,) where a target lies between frames, one beside it
+    position_m: NDArray[np.float64]  # (N, 2)
+    stamps_ns: NDArray[np.int64]  # (N,)
+
+
 def select_windows(
     data: GridData, windows: Sequence[Window], *, sensors: Sequence[str], translate: bool = True
 ) -> WindowSet:
@@ -149,8 +157,16 @@ def select_windows(
     frames = np.array([(*window.input_frames, window.target_frame) for window in windows])
     frames += data.first_frames[recording][:, None]
     inputs, target = frames[:, :-1], frames[:, -1]
-    moved_m = data.position_m[target][:, None] - data.position_m[inputs]
-    lead_ns = data.stamps_ns[target][:, None] - data.stamps_ns[inputs]
+    at = Targets(target, data.position_m[target], data.stamps_ns[target])
+    return windows_at(data, inputs, at, sensors=sensors, translate=translate)
+
+
+def windows_at(
+    data: GridData, inputs: NDArray[np.int64], at: Targets, *, sensors: Sequence[str], translate: bool = True
+) -> WindowSet:
+    """Resolve windows whose inputs (N, T) are frames along F, and whose targets may lie between frames."""
+    moved_m = at.position_m[:, None] - data.position_m[inputs]
+    lead_ns = at.stamps_ns[:, None] - data.stamps_ns[inputs]
     device = data.grids.device
     return WindowSet(
         data=data,
@@ -158,7 +174,7 @@ def select_windows(
         sensor_rows=torch.tensor([data.sensor_index(name) for name in sensors], device=device),
         translate=translate,
         inputs=torch.from_numpy(inputs.copy()).to(device),
-        target_frames=torch.from_numpy(target.copy()).to(device),
+        target_frames=torch.from_numpy(at.frames.copy()).to(device),
         shift_cells=torch.from_numpy(shift_in_cells(moved_m, data.cell_m)).to(device),
         lead_s=torch.from_numpy((lead_ns * 1e-9).astype(np.float32)).to(device),
     )

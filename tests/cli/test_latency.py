@@ -1,8 +1,6 @@
 import shlex
 
-import cv2
 import pytest
-import torch
 from click.testing import CliRunner
 from support.toy_world import street
 
@@ -11,13 +9,7 @@ from semgrid_eval.cli.main import cli, main
 from semgrid_eval.log.store import write_log
 from semgrid_eval.streams.profile import LatencyProfile, read_profile
 
-
-@pytest.fixture(autouse=True)
-def same_threads_after():
-    of_torch, of_opencv = torch.get_num_threads(), cv2.getNumThreads()
-    yield
-    torch.set_num_threads(of_torch)
-    cv2.setNumThreads(of_opencv)
+pytestmark = pytest.mark.usefixtures("same_threads_after")
 
 
 @pytest.fixture

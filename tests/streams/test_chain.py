@@ -28,12 +28,7 @@ WHOLE = FRAMES - WINDOW.span_frames
 CPU = torch.device("cpu")
 
 
-@pytest.fixture(autouse=True)
-def same_threads_after():
-    of_torch, of_opencv = torch.get_num_threads(), cv2.getNumThreads()
-    yield
-    torch.set_num_threads(of_torch)
-    cv2.setNumThreads(of_opencv)
+pytestmark = pytest.mark.usefixtures("same_threads_after")
 
 
 class Watching(Model):

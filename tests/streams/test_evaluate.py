@@ -16,6 +16,7 @@ from semgrid_eval.scores.metrics.iou import confusion
 from semgrid_eval.streams.config import StreamConfig
 from semgrid_eval.streams.evaluate import evaluate_stream, unseen_truth
 from semgrid_eval.streams.plan import evaluated_frames, plan_stream, positions_at
+from semgrid_eval.streams.schedule import Recorded
 from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import WindowConfig, training_windows
@@ -198,3 +199,16 @@ def test_positions_are_exact_at_frames_and_go_on_after_the_last():
     found = positions_at(np.array([10, 15, 20, 40, 60]), stamps_ns, position_m)
     np.testing.assert_array_equal(found[[0, 2, 3]], position_m)
     np.testing.assert_allclose(found[[1, 4]], [[0.5, 0.1], [3.0, 0.5]])
+
+
+def test_recorded_answers_are_kept_in_the_order_of_their_use(data):
+    """Of three in a log, the second is the oldest: what is shown of the first recording begins with it."""
+    stamps_ns = data.stamps_ns[:FRAMES]
+    places, published = np.array([4, 1, 8]), np.array([6, 2, 10])
+    told = Recorded(stamps_ns[places], stamps_ns[places], stamps_ns[published])
+    config = StreamConfig(recorded=True)
+    window = WindowConfig(inputs=1, step_frames=1, target_frame=None)
+    plan = plan_stream(data, [0], config, window, constant(0), sensors=("full",), recorded=lambda name: told)
+    assert (plan.numbers.tolist(), (np.diff(plan.used) >= 0).all()) == ([1, 0, 2], True)
+    evaluation = evaluate_stream(made(RepeatNewest, given(size=SIZE, inputs=1)), plan, spec=SPEC, move=True, batch=3)
+    np.testing.assert_array_equal(evaluation.shown["prediction"], data.grids[0, [1, 4, 8]].numpy())

@@ -148,7 +148,6 @@ def stream_sentence(found: Sequence[Strategy]) -> str:
 
 def _predicts(strategy: Strategy) -> bool:
     """Tell whether it is a prediction that anybody could make, with a lead that was not chosen on what is scored."""
-    facts = strategy.measured.row.record.facts
-    return facts_of(strategy.measured.row).asked == "adaptive" or (
-        facts_of(strategy.measured.row).asked == "fixed" and facts.lead_ms is None
-    )
+    row = strategy.measured.row
+    asked, lead_ms = facts_of(row).asked, row.record.facts.lead_ms
+    return asked == "adaptive" or (asked == "fixed" and lead_ms is None)
