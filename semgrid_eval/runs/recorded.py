@@ -18,11 +18,11 @@ from semgrid_eval.log.predictions import PredictionLog
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.models.model import AnswersIn
 from semgrid_eval.runs.row import Row
-from semgrid_eval.streams.leads import period_ns
 from semgrid_eval.streams.plan import StreamPlan
 from semgrid_eval.streams.schedule import Recorded, Times
 from semgrid_eval.windows.data import WindowSet
 from semgrid_eval.windows.grids import GridData
+from semgrid_eval.windows.lead import period_ns
 
 Grids = NDArray[np.uint8]
 _LIMIT_BYTES = 8 << 30  # of the grids of one log in memory

@@ -203,7 +203,14 @@ class Row(Config):
         words = self.stream.model_copy(update={"added_ms": 0.0}).words
         stream = self.stream
         asked, measured = "recorded" if stream.recorded else stream.asked, stream.latency_ms is None
-        return StreamFacts(words=words, added_ms=stream.added_ms, measured=measured, moved=stream.move, asked=asked)
+        return StreamFacts(
+            words=words,
+            added_ms=stream.added_ms,
+            measured=measured,
+            moved=stream.move,
+            asked=asked,
+            model_is_free=stream.model_is_free,
+        )
 
     @property
     def label(self) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -43,10 +44,21 @@ class Wanted:
 
 
 def wanted_lead(config: WindowConfig, grids: GridData) -> tuple[int, ...]:
-    """Return the lead in frames where it is given in ms, by the rate of the first recording; nothing where not."""
+    """Return the lead in frames where it is given in ms; nothing where not.
+
+    Raises:
+        InputError: it is not as many frames of one recording as of another.
+    """
     if config.lead_ms is None:
         return ()
-    return (frames_of(config.lead_ms, grids.stamps_ns[: grids.first_frames[1]]),)
+    frames = {}
+    for name, (begin, end) in zip(grids.recordings, pairwise(grids.first_frames), strict=True):
+        if end - begin > 1:  # there is a rate
+            frames[frames_of(config.lead_ms, grids.stamps_ns[begin:end])] = name
+    if len(frames) > 1:
+        counts = " and ".join(f"{count} frames of {name}" for count, name in sorted(frames.items())[:2])
+        raise InputError(f"{config.lead_ms:g} ms are {counts}; score recordings of one rate", field="window.lead_ms")
+    return tuple(frames) or (1,)
 
 
 class Selection:

@@ -14,11 +14,11 @@ from semgrid_eval.runs.recorded import PredictionLogs, recorded_times
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.facts import StreamRecord
 from semgrid_eval.scores.results import WindowRecord
-from semgrid_eval.streams.leads import period_ns
 from semgrid_eval.streams.plan import BLOCK_S, Latencies, StreamPlan, plan_stream
 from semgrid_eval.streams.profile import LatencyProfile, read_profile
 from semgrid_eval.streams.schedule import NONE, Times
 from semgrid_eval.windows.grids import GridData
+from semgrid_eval.windows.lead import period_ns
 
 Floats = NDArray[np.float64]
 _MS = 1_000_000
@@ -58,7 +58,8 @@ def latencies_of(row: Row) -> Latencies:
     constant_ns = round((how.added_ms + (how.latency_ms or 0.0)) * _MS)
     if how.profile is None:
         return lambda name, frames: np.full(frames, constant_ns, np.int64)
-    profile, model = read_profile(Path(how.profile)), how.profile_model or row.model
+    profile = read_profile(Path(how.profile))
+    model = None if how.model_is_free else how.profile_model or row.model
     try:
         profile.chain_ms(model)
     except InputError as error:  # it lacks the model
@@ -67,7 +68,7 @@ def latencies_of(row: Row) -> Latencies:
 
 
 def _drawn(
-    profile: LatencyProfile, model: str, name: str, frames: int, *, seed: int, scale: float, added_ns: int
+    profile: LatencyProfile, model: str | None, name: str, frames: int, *, seed: int, scale: float, added_ns: int
 ) -> Times:
     key = int.from_bytes(hashlib.sha256(f"{seed} {name}".encode()).digest()[:6], "big")
     return profile.draw_ns(model, frames, seed=key, scale=scale) + added_ns

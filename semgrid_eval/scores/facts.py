@@ -13,6 +13,7 @@ class StreamFacts(Config):
     measured: bool  # whether its latency was measured, by a profile or by who made the answers
     moved: bool  # whether answers are moved along with the vehicle
     asked: str  # the time that a grid is for, as `streams.config` names it
+    model_is_free: bool  # whether the model's own time is left out
 
 
 class StreamRecord(Config):

@@ -31,6 +31,7 @@ class StreamConfig(Config):
     latency_ms: float | None = Field(None, ge=0, le=60_000)
     profile: str | None = Field(None, min_length=1)  # file that `semgrid-eval latency` writes
     profile_model: str | None = None  # whose latency the profile is asked for; the row's own if not given
+    model_is_free: bool = False  # a bound: the rest of the profile's chain alone takes time
     scale: float = Field(1.0, gt=0, le=1000)  # of the profile: another machine
     added_ms: float = Field(0.0, ge=0, le=60_000)
     workers: Worker = "one"  # one is busy while it works; `many` begin with every frame
@@ -48,6 +49,8 @@ class StreamConfig(Config):
             raise ValueError("recorded: workers, rule and asked are of what is simulated, and nothing is")
         if self.profile is None and (self.scale != 1.0 or self.profile_model is not None):
             raise ValueError("scale and profile_model belong to a profile, and none is given")
+        if self.model_is_free and (self.profile is None or self.profile_model is not None):
+            raise ValueError("model_is_free: give a profile, and no profile_model")
         if self.workers == "many" and self.rule != "newest":
             raise ValueError("rule: one worker waits, many do not")
         return self
@@ -60,6 +63,7 @@ class StreamConfig(Config):
         if self.recorded:
             return f"published as recorded{added}, {moved}"
         latency = f"{self.latency_ms:g} ms" if self.profile is None else f"latency of {self.profile}"
+        latency += " without the model's own" * self.model_is_free
         if self.scale != 1.0:
             latency = f"{self.scale:g} times the {latency}"
         worker = {"one": "one worker", "many": "as many workers as needed"}[self.workers]

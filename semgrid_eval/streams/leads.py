@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.streams.config import Asked
 from semgrid_eval.streams.schedule import Answers, Times
+from semgrid_eval.windows.lead import period_ns
 
 REMEMBERED = 10
 """Past answers by which a chain expects the latency and the spacing of the next ones."""
@@ -82,8 +83,3 @@ _RULES: dict[Asked, Callable[[Answers, Drive], Times]] = {
     "exact": _known,
     "adaptive": _adaptive,
 }
-
-
-def period_ns(captures_ns: Times) -> int:
-    """Median time between frames, 0 where there is one frame."""
-    return int(np.median(np.diff(captures_ns))) if len(captures_ns) > 1 else 0

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.streams.config import Rule
+from semgrid_eval.windows.lead import period_ns
 
 Times = NDArray[np.int64]
 NONE = -1
@@ -58,7 +59,7 @@ def one_worker(captures_ns: Times, latencies_ns: Times, first: int, rule: Rule =
         rule: when to begin.
     """
     count, found = len(captures_ns), list[tuple[int, int, int]]()
-    period_ns = max(1, round(float(np.median(np.diff(captures_ns))))) if count > 1 else 1
+    period = max(1, period_ns(captures_ns))
     expected_ns = round(float(latencies_ns.mean())) if count else 0
     free_ns, following = 0, first
     while following < count:
@@ -66,7 +67,7 @@ def one_worker(captures_ns: Times, latencies_ns: Times, first: int, rule: Rule =
         frame = int(np.searchsorted(captures_ns, begin_ns, side="right")) - 1
         if rule == "shrinking_tail" and frame + 1 < count:
             tail_ns = begin_ns - int(captures_ns[frame])
-            if (tail_ns + expected_ns) % period_ns < tail_ns % period_ns:
+            if (tail_ns + expected_ns) % period < tail_ns % period:
                 frame += 1
                 begin_ns = int(captures_ns[frame])
         free_ns = begin_ns + int(latencies_ns[frame])

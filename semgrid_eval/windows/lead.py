@@ -41,5 +41,10 @@ def lead_from(value: object) -> object:
 
 def frames_of(lead_ms: float, stamps_ns: NDArray[np.int64]) -> int:
     """Return the frames, at least one, that come nearest to a lead at the rate of these captures (F,)."""
-    period_ns = float(np.median(np.diff(stamps_ns))) if len(stamps_ns) > 1 else 0.0
-    return max(1, round(lead_ms * 1e6 / period_ns)) if period_ns > 0 else 1
+    period = period_ns(stamps_ns)
+    return max(1, round(lead_ms * 1e6 / period)) if period > 0 else 1
+
+
+def period_ns(stamps_ns: NDArray[np.int64]) -> int:
+    """Return the median time between captures (F,), 0 where there is one."""
+    return round(float(np.median(np.diff(stamps_ns)))) if len(stamps_ns) > 1 else 0

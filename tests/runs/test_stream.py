@@ -121,6 +121,11 @@ def test_the_page_shows_strategies_and_the_best_lead_can_be_taken(done, tmp_path
             {"model": "residual-town", "window": {"lead_ms": 2000}, "stream": {"latency_ms": 1, "asked": "fixed"}},
             "2000 is not one of the leads that residual-town answers, 59 to 1250 ms",
         ),
+        ({"stream": {"latency_ms": 1, "model_is_free": True}}, "model_is_free: give a profile"),
+        (
+            {"stream": {"profile": "p.json", "profile_model": "ed", "model_is_free": True}},
+            "model_is_free: give a profile, and no profile_model",
+        ),
         ({"stream": {"recorded": True}}, "is for model: log"),
         ({"window": {"lead_ms": 100, "horizon_steps": 2}}, "give one of lead_ms and horizon_steps"),
         ({"window": {"lead_ms": "from nowhere.json"}}, "nowhere.json"),
@@ -152,18 +157,39 @@ def test_latencies_of_a_profile_are_drawn_by_recording_and_a_model_that_it_lacks
         {"name": "newest", "model": "newest", "stream": {"profile": str(path), "scale": 2, "added_ms": 5}},
         {"name": "other", "model": "newest", "stream": {"profile": str(path), "scale": 2, "added_ms": 5, "seed": 1}},
         {"name": "fuse", "model": "fuse", "stream": {"profile": str(path), "asked": "known"}},
+        *(
+            {"name": name, "model": "fuse", "stream": {"profile": str(path), "asked": "adaptive", **how}}
+            for name, how in (("as newest", {"profile_model": "newest"}), ("free", {"model_is_free": True}))
+        ),
     ]
     record = run(rows, logs, tmp_path / "run")
-    first, other = (
-        results.read_result(results.result_folder(tmp_path / "run", row.results[0])) for row in record.rows[:2]
+    first, other, as_newest, free = (
+        results.read_result(results.result_folder(tmp_path / "run", row.results[0]))
+        for row in record.rows
+        if not row.failure
     )
     assert first.stream.latency_ms in (125.0, 185.0, 245.0)
+    assert as_newest.stream.latency_ms in (60.0, 90.0, 120.0)
+    assert free.stream.latency_ms in (50.0, 70.0, 90.0)
     assert first.id != other.id
     assert "latency.json" in record.rows[2].failure
     assert "model fuse: was not measured; the profile has: newest" in record.rows[2].failure
     path.write_text(json.dumps({**profile, "stages": {"grid": [50.0, 91.0]}}))
     again = run(rows, logs, tmp_path / "run")
     assert again.rows[0].results[0] != record.rows[0].results[0], "another profile, another result"
+
+
+def test_a_stream_is_evaluated_as_often_as_it_says(logs, tmp_path):
+    rows = [
+        {"name": f"at {rate} Hz", "model": "newest", "stream": {"latency_ms": 60, "rate_hz": rate}} for rate in (2, 5)
+    ]
+    record = run(rows, logs, tmp_path / "run")
+    found = [results.read_result(results.result_folder(tmp_path / "run", row.results[0])) for row in record.rows]
+    assert [result.stream.evaluations for result in found] == [2, 6], "of two recordings of nine frames, .47 s"
+    assert found[0].targets != found[1].targets, "what is evaluated at other times is not subtracted"
+    write_report([tmp_path / "run"], tmp_path / "report")
+    with (tmp_path / "report" / "streams.csv").open() as file:
+        assert [line["evaluations"] for line in csv.DictReader(file)] == ["2", "6"]
 
 
 def test_two_processes_give_the_same_numbers_as_one(logs, tmp_path):

@@ -15,7 +15,8 @@ from semgrid_eval.report.rows.load import Result, Row, Run
 from semgrid_eval.report.rows.pairing import settings_but
 from semgrid_eval.scores.facts import StreamFacts, StreamRecord
 
-_LATENCY = ("latency_ms", "profile", "profile_model", "scale", "added_ms")
+_CHAIN = ("profile", "profile_model", "scale")
+_LATENCY = ("latency_ms", "added_ms", *_CHAIN)
 """Last parts of the keys of settings by which the rows of one strategy differ."""
 _DELAY = re.compile(r"\s*\+\s*\d+(\.\d+)?( ms)?$")
 WARM = "after the warm-up"
@@ -74,7 +75,16 @@ def strategies(scores: Scores) -> list[Strategy]:
     for entry in scores.values():
         if entry.row.is_stream:
             groups.setdefault((entry.row.run, settings_but(entry.row, *_LATENCY)), []).append(entry)
-    return [_strategy(entries) for entries in groups.values()]
+    return [_strategy(part) for entries in groups.values() for part in _by_chain(entries)]
+
+
+def _by_chain(entries: Sequence[RowScores]) -> list[list[RowScores]]:
+    """Part rows by the chain whose latency was measured; simulated latencies are on the curve of the only one."""
+    parts: dict[object, list[RowScores]] = {}
+    for entry in entries:
+        chain = tuple(entry.row.results[0].settings.get(f"stream.{key}") for key in _CHAIN)
+        parts.setdefault(facts_of(entry.row).measured and chain, []).append(entry)
+    return [list(entries)] if len(parts) <= 2 and False in parts else list(parts.values())
 
 
 def _strategy(entries: Sequence[RowScores]) -> Strategy:

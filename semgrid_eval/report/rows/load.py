@@ -111,8 +111,9 @@ class Row:
 
     @property
     def is_oracle(self) -> bool:
-        """Whether it is a stream that knows when its answers will be used, as nobody does."""
-        return self.record.facts.stream is not None and self.record.facts.stream.asked in ("known", "exact")
+        """Whether it is a stream that nobody has: it knows when answers will be used, or its model takes no time."""
+        how = self.record.facts.stream
+        return how is not None and (how.asked in ("known", "exact") or how.model_is_free)
 
     @property
     def targets(self) -> str:

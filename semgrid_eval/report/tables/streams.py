@@ -150,4 +150,4 @@ def _predicts(strategy: Strategy) -> bool:
     """Tell whether it is a prediction that anybody could make, with a lead that was not chosen on what is scored."""
     row = strategy.measured.row
     asked, lead_ms = facts_of(row).asked, row.record.facts.lead_ms
-    return asked == "adaptive" or (asked == "fixed" and lead_ms is None)
+    return not row.is_oracle and (asked == "adaptive" or (asked == "fixed" and lead_ms is None))

@@ -17,7 +17,9 @@ from semgrid_eval.scores.facts import StreamFacts, StreamRecord
 from semgrid_eval.scores.metrics.table import IOU
 
 
-def stream(name, hits, *, delay, asked="capture", measured=False, moved=True, first=0.0, lead_ms=None, **config):
+def stream(
+    name, hits, *, delay, asked="capture", measured=False, moved=True, free=False, first=0.0, lead_ms=None, **chain
+):
     """A row with a stream that has as many hits of road and car in each of its recordings."""
     values = hits if isinstance(hits, list) else [hits] * 12
     made = counted_row(name, {"road": values, "car": values})
@@ -27,6 +29,7 @@ def stream(name, hits, *, delay, asked="capture", measured=False, moved=True, fi
         measured=measured,
         moved=moved,
         asked=asked,
+        model_is_free=free,
     )
     bound = "lower" if asked == "capture" else ""
     facts = made.record.facts.model_copy(update={"stream": how, "bound": bound, "lead_ms": lead_ms})
@@ -40,7 +43,13 @@ def stream(name, hits, *, delay, asked="capture", measured=False, moved=True, fi
         latency_ms=delay,
         lead_ms=lead_ms or 0.0,
     )
-    settings = {"asked": asked, "move": moved, "stream": {"added_ms": delay}, "window": {"lead_ms": lead_ms}, **config}
+    settings = {
+        "asked": asked,
+        "move": moved,
+        "free": free,
+        "stream": {"added_ms": delay, **chain},
+        "window": {"lead_ms": lead_ms},
+    }
     record = made.results[0].record.model_copy(update={"facts": facts, "stream": went, "config": settings})
     result = replace(made.results[0], record=record)
     return replace(made, record=made.record.model_copy(update={"facts": facts}), results=(result,))
@@ -68,6 +77,22 @@ def test_rows_that_differ_in_their_latency_alone_are_one_strategy_with_the_measu
     assert found["BL-newest"].measured.row.name == "BL-newest"
     assert found["BL-newest"].delays_ms == [0, 100, 200, 200, 400]
     assert plain_strategy(list(found.values())) is found["BL-newest"], "moved along rather than not"
+
+
+def test_chains_whose_latency_was_measured_are_strategies_of_their_own():
+    measured = [
+        stream(name, 60, delay=delay, measured=True, profile="latency.json", scale=scale)
+        for name, delay, scale in (("RN", 50.0, 1.0), ("RN +100", 150.0, 1.0), ("RN half as fast", 100.0, 2.0))
+    ]
+    simulated = stream("RN at 300", 30, delay=300.0)
+    both = strategies(scored([*measured, simulated]))
+    assert [[entry.row.name for entry in each.entries] for each in both] == [
+        ["RN", "RN +100"],
+        ["RN half as fast"],
+        ["RN at 300"],
+    ]
+    (one,) = strategies(scored([*measured[:2], simulated]))
+    assert one.delays_ms == [50, 150, 300], "with one chain, simulated latencies are on its curve"
 
 
 def test_what_is_won_in_time_is_read_from_the_curve_of_the_newest_grid():
@@ -156,10 +181,11 @@ def test_a_stream_is_measured_against_the_newest_grid_that_moves_along_and_no_or
         stream("BL-newest", 60, delay=200.0, measured=True),
         stream("RN", 70, delay=220.0, measured=True, asked="adaptive"),
         stream("RN-known", 80, delay=220.0, measured=True, asked="known"),
+        stream("RN-free", 90, delay=200.0, measured=True, asked="adaptive", free=True),
         stream("RN-fixed", 65, delay=220.0, measured=True, asked="fixed", lead_ms=100.0),
     ]
     assert {row.name: reference_of(row, found).name for row in found[2:]} == dict.fromkeys(
-        ("RN", "RN-known", "RN-fixed"), "BL-newest"
+        ("RN", "RN-known", "RN-free", "RN-fixed"), "BL-newest"
     )
     assert headline(scored(found)).best.name == "RN"
     assert all(way_of(row, found) is None for row in found)
