@@ -24,7 +24,7 @@ QUICK := tests/recording tests/log tests/grids tests/sensors tests/windows tests
 WITHOUT_TORCH := tests/recording tests/log tests/test_config.py tests/test_files.py tests/test_geometry.py tests/test_motion.py
 SOAK ?= build/soak
 
-.PHONY: demo test check reference fuzz licences soak test-lowest test-pythons clean
+.PHONY: demo test check docs reference fuzz licences soak test-lowest test-pythons clean
 
 demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo
@@ -65,6 +65,11 @@ check: $(READY)  ## lint, format and types
 
 fuzz: $(READY)  ## mutated logs, pictures, settings and results, of each kind FUZZ_COUNT within FUZZ_SECONDS in all
 	PYTHONPATH=.:tests $(BIN)/python tools/fuzz.py --count $(FUZZ_COUNT) --seconds $(FUZZ_SECONDS)
+
+docs: $(READY)  ## these pages as a site, in build/site; a warning is an error
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	$(BIN)/python tools/format_pages.py --check
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
 licences: $(READY)  ## of all packages that are needed
 	$(BIN)/python tools/licences.py

@@ -13,7 +13,7 @@ from support.toy_world import street
 from semgrid_eval.log.store import write_log
 from semgrid_eval.scores import results
 
-PAGE = (Path(__file__).parents[1] / "docs" / "predictions.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "predictions.md").read_text(encoding="utf-8")
 
 
 def test_the_example_writes_logs_that_its_rows_score(tmp_path, monkeypatch):

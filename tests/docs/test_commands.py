@@ -1,0 +1,115 @@
+"""The commands of pages run one after the other, with less data and fewer rows where that is said here."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from support.cityscapes_tree import Tree
+from support.onnx_models import colour_network
+from support.pages import blocks, commands, text_of
+from support.toy_world import street
+
+from semgrid_eval.cli.main import main
+from semgrid_eval.log.store import write_log
+
+TOWN = (
+    "--recordings 2 --towns 2 --val-towns 1 --val-share 0.5 --town-size-m 250 --duration-s 15 --width 128 --height 64"
+)
+LESS = {
+    "convert synthetic logs": f"{TOWN} --cache towns --workers 1",
+    "convert synthetic drives": f"{TOWN} --cache towns --workers 1 --frames 30",
+    "latency": "--frames 6 --warm-up 2",
+    "run paper-cpu": "--row BL-DC --row BL-Fuse --jobs 1",
+    "run real": "--row BL-DC --jobs 1",
+    "run stream-cpu": "--row 'newest +0' --row 'BL-Fuse +40' --row 'RN-town +0' --jobs 1",
+    "run baselines --model": "--row Mine --row BL-DC",
+}
+"""What is said last holds: options behind those of a page."""
+SHORTER = ("epochs: 8, updates_per_epoch: 150, batch: 8, schedule: {drop_epoch: 6}", "epochs: 1, updates_per_epoch: 2")
+FINDINGS = {"check logs --spec recording.yaml --strict": 1}
+"""Commands that are to find something, with their exit code: recordings of 1.7 s are too short for that contract."""
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def exit_code(words):
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    return ended.value.code
+
+
+def run(page):
+    """Run a page's commands, but for what installs."""
+    for line in commands(text_of(page)):
+        if not line.startswith("semgrid-eval "):
+            continue
+        line = line.removeprefix("semgrid-eval ")
+        less = next((options for start, options in LESS.items() if line.startswith(start)), "")
+        words = [part for word in shlex.split(line) for part in (sorted(map(str, Path().glob(word))) or [word])]
+        assert exit_code(words + shlex.split(less)) == FINDINGS.get(line, 0), line
+
+
+def toy_logs(folder):
+    for number, split in enumerate(("train", "val")):
+        world = street(number, frames=30, speed_mps=8.0, noise_px=0.05)
+        write_log(world.recording(f"toy_{number:06}_000000", split), Path(folder) / split / f"toy{number}.mcap")
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_tour(workplace, page):
+    run(page)
+    assert Path("runs/first/report/index.html").is_file()
+    assert Path("play.mcap").is_file() == (page == "docs/index.md")
+
+
+def test_own_data(workplace):
+    for frame in Tree(Path("SRC"), size=(128, 64)).write(range(30)):
+        Path("PREDICTIONS").mkdir(exist_ok=True)
+        Path(f"PREDICTIONS/{frame}_labels.png").write_bytes(Tree(Path("SRC"), size=(128, 64)).label())
+    toy_logs("recordings")
+    Path("runs/paper/trainings").mkdir(parents=True)
+    colour_network(Path("network.onnx"), colours={0: (0.5, 0.5, 0.5), 11: (1.0, 0.0, 0.0)})
+    run("docs/own-data.md")
+    assert len(list(Path("labelled").rglob("*.mcap"))) == 1
+
+
+def test_own_model(workplace):
+    import torch
+
+    toy_logs("logs")
+    for block in blocks("python", text_of("docs/own-model.md")):
+        Path(re.match(r"# (\S+)", block)[1]).write_text(block)
+    torch.save({"layer.weight": torch.rand(10, 10, 5, 5), "layer.bias": torch.zeros(10)}, "mine.pt")
+    (matrix,) = blocks("yaml", text_of("docs/own-model.md"))
+    assert SHORTER[0] in matrix
+    Path("small.yaml").write_text(matrix.replace(*SHORTER).replace("repeats: 3", "repeats: 1"))
+    run("docs/own-model.md")
+    assert len(list(Path("runs/small/results").iterdir())) == 3
+
+
+def test_report_and_playback(workplace):
+    toy_logs("logs")
+    assert exit_code(["run", "baselines", "--logs", "logs", "--out", "runs/first"]) == 0
+    run("docs/report.md")
+    named = set(re.findall(r"^\| `([^`]+)`", text_of("docs/report.md"), re.MULTILINE))
+    assert named <= {path.name + "/" * path.is_dir() for path in Path("runs/first/report").iterdir()}
+    run("docs/playback.md")
+    assert Path("play.layout.json").is_file()
+
+
+def test_check(workplace):
+    toy_logs("logs")
+    Path("recording.yaml").write_text(blocks("yaml", text_of("docs/check.md"))[0])
+    run("docs/check.md")
+
+
+def test_latency_and_streaming(workplace):
+    run("docs/streaming.md")
+    Path("drives").rename("logs")
+    run("docs/latency.md")
+    assert Path("runs/stream/report/index.html").is_file()
