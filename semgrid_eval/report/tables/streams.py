@@ -7,7 +7,7 @@ from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores,
 from semgrid_eval.report.estimates.leads import LeadSeries
 from semgrid_eval.report.estimates.streams import Strategy, facts_of, pairs_with, plain_strategy, record_of, won_ms
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, verdict
-from semgrid_eval.report.tables.numbers import ABSENT, finite, interval_phrase, number, signed
+from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, signed
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
 from semgrid_eval.report.tables.values import evidence
 
@@ -100,8 +100,13 @@ def _wins(strategy: Strategy, plain: Strategy) -> Iterator[Line]:
 def _won(won: Estimate) -> Cell:
     if not math.isfinite(won.value):
         return Cell(ABSENT, title="its score lies outside of those of the curve")
-    ends = [f"{end:+.0f}" for end in (won.low, won.high) if math.isfinite(end)]
-    return Cell(f"{won.value:+.0f}", finite(won.value), " to ".join(ends) if len(ends) == 2 else "", tone=verdict(won))
+    ends = (won.low, won.high) if math.isfinite(won.low) and math.isfinite(won.high) else None
+    note = " to ".join(map(_whole, ends)) if ends else ""
+    return Cell(_whole(won.value), finite(won.value), note, tone=verdict(won), interval=ends)
+
+
+def _whole(value_ms: float) -> str:
+    return f"{value_ms:+.0f}".replace("-", MINUS)
 
 
 def lead_table(found: Sequence[LeadSeries]) -> Table | None:
