@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import click
-from rich import progress as rich
-from rich.console import Console
 
 from semgrid_eval.errors import printable
 from semgrid_eval.progress import Progress
@@ -36,6 +34,9 @@ def progress(label: str) -> Iterator[Progress]:
 
 
 def _bar(label: str) -> Iterator[Progress]:
+    from rich import progress as rich  # not needed for any --help
+    from rich.console import Console
+
     columns = (
         *(rich.SpinnerColumn(), rich.TextColumn("{task.description}"), rich.BarColumn(), rich.MofNCompleteColumn()),
         *(rich.TimeElapsedColumn(), rich.TimeRemainingColumn()),

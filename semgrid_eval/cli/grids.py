@@ -6,7 +6,6 @@ import click
 
 from semgrid_eval.cli.console import progress, say
 from semgrid_eval.cli.options import FOLDER, THERE, chosen_executor, executor_options, workers_option
-from semgrid_eval.config import load_yaml, parse_config
 
 
 @click.command("grids", epilog="Example: semgrid-eval grids logs grids")
@@ -20,6 +19,7 @@ def command(logs: Path, out: Path, config: Path | None, workers: int, executor: 
 
     Each recording is built once for a configuration and found again by the digest of log and configuration.
     """
+    from semgrid_eval.config import load_yaml, parse_config
     from semgrid_eval.grids.build import build_grids
     from semgrid_eval.grids.spec import GridConfig
     from semgrid_eval.log.store import find_logs

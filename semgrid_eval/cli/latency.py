@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from semgrid_eval.cli.console import command_line, progress, say
-from semgrid_eval.cli.options import FOLDER, THERE, device_option, parameters_of
+from semgrid_eval.cli.fields import parameters_of
+from semgrid_eval.cli.options import FOLDER, THERE, device_option
 from semgrid_eval.config import parse_config
 from semgrid_eval.segmentation.config import SegmentationConfig
 

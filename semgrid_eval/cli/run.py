@@ -17,8 +17,7 @@ from semgrid_eval.cli.options import (
     workers_option,
 )
 from semgrid_eval.errors import printable
-from semgrid_eval.executors import local_executor
-from semgrid_eval.ray_executor import LOCAL
+from semgrid_eval.workplace import LOCAL
 
 if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.runs.matrix import Matrix
@@ -83,6 +82,7 @@ def command(
 
     --dry-run builds the grids, which a run then finds, times a few updates of each network, and prints the plan.
     """
+    from semgrid_eval.executors import local_executor
     from semgrid_eval.models.device import visible_gpus
     from semgrid_eval.models.memory import guest_limits
     from semgrid_eval.models.registry import own_models as run_own_models

@@ -6,8 +6,9 @@ from typing import Any
 import click
 
 from semgrid_eval.cli.console import progress
-from semgrid_eval.cli.convert import show
-from semgrid_eval.cli.options import FOLDER, THERE, WORKERS, parameters_of
+from semgrid_eval.cli.converted import show
+from semgrid_eval.cli.fields import parameters_of
+from semgrid_eval.cli.options import FOLDER, THERE, WORKERS
 from semgrid_eval.config import parse_config
 from semgrid_eval.segmentation.config import SegmentationConfig
 
