@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from semgrid_eval.cli.console import progress, say
+from semgrid_eval.cli.console import complain, loudness_options, progress
 
 if TYPE_CHECKING:
     from semgrid_eval.bench.measurement import Measurement
@@ -22,6 +22,7 @@ _SHOWN = ("processor", "cpu_cores", "torch_threads", "device", "gpu", "python", 
 @click.option(
     "--json", "json_file", type=click.Path(path_type=Path, dir_okay=False), help="Also write everything there."
 )
+@loudness_options
 def command(only: str | None, device: str, json_file: Path | None, *, quick: bool) -> None:
     """Measure the speed of this machine: medians of three, some minutes on two cores.
 
@@ -39,7 +40,7 @@ def command(only: str | None, device: str, json_file: Path | None, *, quick: boo
     chosen = choose_device(device)
     here = conditions(chosen)
     if load() > _BUSY * available_cores():
-        say(f"Warning: this machine has other work (load {here['load']}); measured speeds are lower than its own")
+        complain(f"Warning: this machine has other work (load {here['load']}); measured speeds are lower than its own")
     with progress("measure") as watch:
         found = measure(parts, QUICK if quick else FULL, device=chosen, progress=watch)
     if json_file:

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from semgrid_eval.cli.console import progress
+from semgrid_eval.cli.console import loudness_options, progress
 from semgrid_eval.cli.converted import show
 from semgrid_eval.cli.groups import TableGroup
 from semgrid_eval.cli.options import FOLDER, chosen_executor, executor_options, workers_option
@@ -28,6 +28,7 @@ def command_of(name: str, source: Source[Any]) -> click.Command:
 
     @workers_option("Logs at once.")
     @executor_options
+    @loudness_options
     def convert(out: Path, workers: int, executor: str, address: str, **given: Any) -> int:  # noqa: ANN401 - options
         from semgrid_eval.config import parse_config
         from semgrid_eval.log.convert import Work

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semgrid_eval.cli.console import say
+from semgrid_eval.cli.console import complain, say
 from semgrid_eval.errors import InputError
 
 if TYPE_CHECKING:
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 def show(summary: "ConversionSummary", out: Path) -> int:
     """Print what became of a conversion, and return the exit code."""
     for label, reason in summary.failed.items():
-        say(f"Error: {label}: {reason}")
+        complain(f"Error: {label}: {reason}")
     say(f"{out}: {len(summary.written)} written, {len(summary.skipped)} up to date, {len(summary.failed)} failed")
     others = _strays(out, summary)
     if others:
-        say(f"Warning: {out} holds {len(others)} logs that do not belong to this conversion, such as {others[0]}")
+        complain(f"Warning: {out} holds {len(others)} logs that do not belong to this conversion, such as {others[0]}")
     if summary.remark:
-        say(summary.remark)
+        (complain if summary.remark.startswith("Warning") else say)(summary.remark)
     return 1 if summary.failed else 0
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from semgrid_eval.cli.console import command_line, progress, say
+from semgrid_eval.cli.console import command_line, loudness_options, progress, say
 from semgrid_eval.cli.converted import show
 from semgrid_eval.cli.options import FOLDER, device_option, workers_option
 
@@ -20,6 +20,7 @@ TOWNS = 8
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
 @device_option
 @workers_option("Processes at once.")
+@loudness_options
 def command(out: Path, recordings: int, seed: int, device: str, workers: int) -> int:
     """Simulate a town, record drives through it as logs, train, score and report: a few minutes on two cores.
 

@@ -1,11 +1,13 @@
 """Options of several commands, most of which say where the work is done."""
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import click
 
+from semgrid_eval.cli.console import Command
 from semgrid_eval.workplace import LOCAL, Limits
 
 if TYPE_CHECKING:
@@ -14,7 +16,37 @@ if TYPE_CHECKING:
 FOLDER = click.Path(path_type=Path, file_okay=False)
 THERE = click.Path(path_type=Path, exists=True)
 WORKERS = click.IntRange(1, 256)
-Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class _Pattern(click.Path):
+    """A path that exists, or a pattern such as 'logs/*.mcap' where no shell has put names in its place."""
+
+    def convert(  # type: ignore[override] # several paths for one word
+        self, value: "str | os.PathLike[str]", param: click.Parameter | None, ctx: click.Context | None
+    ) -> list[Path]:
+        from glob import glob
+
+        pattern = os.fspath(value)
+        if not any(sign in pattern for sign in "*?[") or Path(pattern).exists():
+            super().convert(value, param, ctx)
+            return [Path(pattern)]
+        found = sorted(map(Path, glob(pattern, recursive=True)))  # noqa: PTH207 - absolute patterns, too
+        if not found:
+            self.fail(f"Nothing matches {pattern!r}.", param, ctx)
+        return found
+
+
+def logs_argument() -> click.Argument:
+    """Make the argument LOG...: logs, folders of logs and patterns of either, all of which exist."""
+
+    def flat(ctx: click.Context, option: click.Parameter, given: Sequence[Sequence[Path]]) -> tuple[Path, ...]:
+        return tuple(dict.fromkeys(path for each in given for path in each))
+
+    return click.Argument(
+        ["logs"], metavar="LOG...", nargs=-1, required=True, type=_Pattern(exists=True), callback=flat
+    )
+
+
 device_option = click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 import click
 
-from semgrid_eval.cli.console import progress, say
+from semgrid_eval.cli.console import complain, loudness_options, progress
 
 
 @click.command("report", epilog="Example: semgrid-eval report runs/first")
@@ -18,6 +18,7 @@ from semgrid_eval.cli.console import progress, say
     show_default=True,
     help="What intervals resample first: recordings, or the towns, cities or drives that they belong to.",
 )
+@loudness_options
 def command(runs: tuple[Path, ...], out: Path | None, resample: Literal["recordings", "groups"]) -> int:
     """Write one self-contained HTML page, CSV tables and figures from what RUN left on disk.
 
@@ -30,6 +31,6 @@ def command(runs: tuple[Path, ...], out: Path | None, resample: Literal["recordi
     with progress("reading results") as shown:
         page = write_report(runs, out, resample=resample, progress=shown, damaged=damages.append)
     for damage in damages:
-        say(f"Error: {damage}")
+        complain(f"Error: {damage}")
     click.echo(page)
     return 1 if damages else 0

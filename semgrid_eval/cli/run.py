@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from semgrid_eval.cli.console import command_line, progress, say
+from semgrid_eval.cli.console import command_line, complain, loudness_options, progress, say
 from semgrid_eval.cli.options import (
     FOLDER,
     THERE,
@@ -47,6 +47,7 @@ _MODEL = "One more row: a model of your own, path.py:Class, or an installed one.
     "--pictures/--no-pictures", default=True, show_default=True, help="Keep small pictures for the report's examples."
 )
 @click.option("--dry-run", is_flag=True, help="Only say what would be done and how long it would take.")
+@loudness_options
 def command(
     matrix: str,
     logs: Path,
@@ -117,9 +118,9 @@ def show_run(record: "RunRecord", rows: Collection[str]) -> int:
     """Print which of the named rows and which logs failed, and return the exit code."""
     failed = [row for row in record.rows if row.failure and row.name in rows]
     for row in failed:
-        say(f"Error: row {row.name}: {row.failure}")
+        complain(f"Error: row {row.name}: {row.failure}")
     for reason in record.failed_logs.values():
-        say(f"Error: {reason}")
+        complain(f"Error: {reason}")
     return 1 if record.failed_logs or failed else 0
 
 
