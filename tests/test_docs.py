@@ -23,7 +23,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 EXPERIMENTS = [
     (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("remedies", "disturbances", "predictions")
 ]
-LATENCY = (ROOT / "docs" / "latency.md").read_text(encoding="utf-8")
+LATENCY, SHELL = ((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("latency", "shell"))
 
 
 def blocks(language, page=README):
@@ -31,9 +31,9 @@ def blocks(language, page=README):
 
 
 def commands():
-    shown = [block for page in (README, *EXPERIMENTS, LATENCY) for block in blocks("sh", page)]
+    shown = [block for page in (README, *EXPERIMENTS, LATENCY, SHELL) for block in blocks("sh", page)]
     lines = [line.partition("#")[0].strip() for block in shown for line in block.splitlines()]
-    return list(dict.fromkeys(line for line in lines if line.startswith("semgrid-eval ")))
+    return list(dict.fromkeys(line for line in lines if line.startswith("semgrid-eval ") and "--help" not in line))
 
 
 @pytest.fixture
@@ -116,7 +116,7 @@ def test_python_of_the_readme_runs(tmp_path, monkeypatch):
         *("README.md", "ARCHITECTURE.md", "reports/README.md"),
         *("docs/performance.md", "docs/readings.md", "docs/town.md", "docs/remedies.md", "docs/disturbances.md"),
         *("docs/ceiling.md", "docs/network.md", "docs/model-card.md", "docs/check.md", "docs/latency.md"),
-        *("docs/streaming.md", "docs/predictions.md"),
+        *("docs/streaming.md", "docs/predictions.md", "docs/shell.md", "CONTRIBUTING.md"),
     ],
 )
 def test_links_and_files_that_a_page_names_exist(page):
