@@ -23,7 +23,9 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 EXPERIMENTS = [
     (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("remedies", "disturbances", "predictions")
 ]
-LATENCY, SHELL = ((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("latency", "shell"))
+LATENCY, SHELL, GATE = (
+    (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("latency", "shell", "gate")
+)
 
 
 def blocks(language, page=README):
@@ -31,7 +33,7 @@ def blocks(language, page=README):
 
 
 def commands():
-    shown = [block for page in (README, *EXPERIMENTS, LATENCY, SHELL) for block in blocks("sh", page)]
+    shown = [block for page in (README, *EXPERIMENTS, LATENCY, SHELL, GATE) for block in blocks("sh", page)]
     lines = [line.partition("#")[0].strip() for block in shown for line in block.splitlines()]
     return list(dict.fromkeys(line for line in lines if line.startswith("semgrid-eval ") and "--help" not in line))
 
@@ -116,7 +118,7 @@ def test_python_of_the_readme_runs(tmp_path, monkeypatch):
         *("README.md", "ARCHITECTURE.md", "reports/README.md"),
         *("docs/performance.md", "docs/readings.md", "docs/town.md", "docs/remedies.md", "docs/disturbances.md"),
         *("docs/ceiling.md", "docs/network.md", "docs/model-card.md", "docs/check.md", "docs/latency.md"),
-        *("docs/streaming.md", "docs/predictions.md", "docs/shell.md", "CONTRIBUTING.md"),
+        *("docs/streaming.md", "docs/predictions.md", "docs/shell.md", "docs/gate.md", "CONTRIBUTING.md"),
     ],
 )
 def test_links_and_files_that_a_page_names_exist(page):
