@@ -25,6 +25,7 @@ COMMANDS = {
     "run": "Train and score the rows of a matrix.",
     "report": "A run's page, tables and figures.",
     "play": "What a row predicted, as a log for viewers.",
+    "cache": "Which grids and towns are kept; removes unused ones.",
     "latency": "How long a perception chain takes on this machine.",
     "bench": "How fast everything is on this machine.",
 }
