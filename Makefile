@@ -24,7 +24,12 @@ QUICK := tests/recording tests/log tests/grids tests/sensors tests/windows tests
 WITHOUT_TORCH := tests/recording tests/log tests/test_config.py tests/test_files.py tests/test_geometry.py tests/test_motion.py
 SOAK ?= build/soak
 
-.PHONY: demo test check docs reference fuzz licences soak test-lowest test-pythons clean
+# What the installed wheel is tried with: the stages of the demo at their smallest, in a folder of its own.
+PACKAGE ?= build/package
+PACKAGE_COMMANDS := "convert synthetic logs --recordings 4 --towns 2 --town-size-m 250 --duration-s 15" "check logs" \
+  "run smoke --logs logs --out run" "report run" "play run ED-DC --logs logs --out play.mcap"
+
+.PHONY: demo test check docs reference fuzz licences soak package test-lowest test-pythons clean
 
 demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo
@@ -39,6 +44,13 @@ test: $(READY)  ## the whole suite
 soak: $(READY)  ## kills, stops, full disks and two processes in one folder: the same bytes in the end; some ten minutes
 	rm -rf $(SOAK)
 	OMP_NUM_THREADS=1 $(BIN)/python tools/soak.py $(SOAK)
+
+package: $(READY)  ## wheel and sdist in dist, and the wheel at work in a bare environment, away from this checkout
+	rm -rf dist $(PACKAGE)
+	$(BIN)/python -m build --outdir dist
+	$(PYTHON) -m venv $(PACKAGE)/venv
+	$(PACKAGE)/venv/bin/python -m pip install --quiet "$$(echo dist/*.whl)[synthetic]"
+	cd $(PACKAGE) && for command in $(PACKAGE_COMMANDS); do venv/bin/semgrid-eval $$command || exit 1; done
 
 test-lowest: $(READY)  ## the quick tests with the lowest versions of all requirements, but for torch
 	rm -rf build/lowest && $(PYTHON) -m venv build/lowest

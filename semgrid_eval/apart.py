@@ -11,10 +11,10 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any
 
 from semgrid_eval.errors import SemgridError
+from semgrid_eval.workplace import Limits
 
 _SIZES = struct.Struct("<QQ")
 _HEAD_LIMIT_BYTES = 64 << 20
@@ -29,14 +29,6 @@ settle_apart(given["parent"], given["memory_bytes"])
 from importlib import import_module
 import_module(given["module"]).serve(given["descriptor"])
 """
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a process apart may use; None is no limit."""
-
-    time_s: float | None = 3600.0  # without any sign: an answer, or progress on the way to it
-    memory_bytes: int | None = None  # of its data, on systems that know such a limit
 
 
 class ApartError(SemgridError):

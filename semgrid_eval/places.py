@@ -66,7 +66,10 @@ def held_folder(path: Path) -> Iterator[Path]:
     while True:
         made = partial_of(path)
         made.mkdir()
-        descriptor = os.open(made, os.O_RDONLY) if fcntl is not None else -1
+        try:
+            descriptor = os.open(made, os.O_RDONLY) if fcntl is not None else -1
+        except FileNotFoundError:  # another process has taken it for one that was left
+            continue
         if descriptor < 0 or hold(descriptor):
             break
         os.close(descriptor)

@@ -16,11 +16,11 @@ from typing import Any, TypeVar
 
 from semgrid_eval.errors import InputError, MissingExtraError, first_line
 from semgrid_eval.executors import NoRoomError, WorkerDied, thread_variables
+from semgrid_eval.workplace import LOCAL
 
 T = TypeVar("T")
 R = TypeVar("R")
 
-LOCAL = "local"
 CONNECTION_TIMEOUT_S = 5.0
 _LOOPBACK = "127.0.0.1"
 # Ray reads these when it is imported. Where the first is off, addresses of this machine stay on its loopback interface;

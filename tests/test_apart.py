@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from semgrid_eval.apart import Apart, ApartError, Limits
+from semgrid_eval.apart import Apart, ApartError
+from semgrid_eval.workplace import Limits
 
 MODULE = "support.answers"
 

@@ -54,6 +54,8 @@ def modules() -> Iterator[tuple[str, Path]]:
 def floor_of(parts: tuple[str, ...]) -> str:
     if parts == ("__init__",):  # the public names, each imported when it is asked for
         return "api"
+    if parts == ("__main__",):
+        return "cli"
     return parts[0] if parts and parts[0] in FLOORS else "ground"
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from semgrid_eval.files import atomic_file, atomic_folder
-from semgrid_eval.places import exchange, partial_of, remove_stale
+from semgrid_eval.places import exchange, held_folder, partial_of, remove_stale
 
 WRITER = """
 import sys
@@ -109,3 +109,18 @@ def test_a_file_that_somebody_removes_before_it_is_shown_to_be_written_is_begun_
     assert len(names) == 2
     assert (tmp_path / "out").read_bytes() == b"whole"
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_folder_that_another_process_takes_for_one_that_was_left_is_made_again(tmp_path, monkeypatch):
+    system_open, taken = os.open, []
+
+    def take_first(path, *options):
+        if not taken:
+            taken.append(path)
+            Path(path).rmdir()
+        return system_open(path, *options)
+
+    monkeypatch.setattr(os, "open", take_first)
+    with held_folder(tmp_path / "folder") as made:
+        assert made.is_dir()
+        assert made not in taken

@@ -200,7 +200,7 @@ def added(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name, text in FILES.items():
         (tmp_path / f"{name}.py").write_text(text)
-    monkeypatch.setitem(SOURCES, "lane", Known("seam_source:SOURCE"))
+    monkeypatch.setitem(SOURCES, "lane", Known("seam_source:SOURCE", "Lanes."))
     monkeypatch.setitem(KINDS, "kerb", importlib.import_module("seam_sensor").KIND)
     monkeypatch.setitem(DISTURBANCES, "fog", importlib.import_module("seam_disturbance").Fog)
     monkeypatch.setitem(MODELS, "oldest", "seam_baseline:Oldest")

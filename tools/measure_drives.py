@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.progress import silent
-from semgrid_eval.sources.town.drives import FRAME_COUNT, FRAME_RATE_HZ, ego_path
-from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
+from semgrid_eval.sources.town.config import FRAME_COUNT, SyntheticConfig
+from semgrid_eval.sources.town.drives import FRAME_RATE_HZ, ego_path
+from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import RecordingPlan
 from semgrid_eval.sources.town.town import load_town
 

@@ -21,9 +21,9 @@ from semgrid_eval.progress import silent
 from semgrid_eval.recording.types import Recording
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sources.benchmarks import Stereo
-from semgrid_eval.sources.town.drives import FRAME_COUNT
+from semgrid_eval.sources.town.config import FRAME_COUNT, SyntheticConfig
 from semgrid_eval.sources.town.kinds import KINDS
-from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
+from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
 from semgrid_eval.sources.town.town import TownSpec, prepare_town
 

@@ -2,13 +2,14 @@
 
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from semgrid_eval.bench.measurement import FULL, QUICK, Measurement
-from semgrid_eval.cli.console import progress, say
-from semgrid_eval.executors import available_cores
-from semgrid_eval.files import write_json
+from semgrid_eval.cli.console import complain, loudness_options, progress
+
+if TYPE_CHECKING:
+    from semgrid_eval.bench.measurement import Measurement
 
 _BUSY = 0.5  # load for each core above which speeds suffer
 _SHOWN = ("processor", "cpu_cores", "torch_threads", "device", "gpu", "python", "torch", "numpy", "semgrid-eval")
@@ -21,6 +22,7 @@ _SHOWN = ("processor", "cpu_cores", "torch_threads", "device", "gpu", "python", 
 @click.option(
     "--json", "json_file", type=click.Path(path_type=Path, dir_okay=False), help="Also write everything there."
 )
+@loudness_options
 def command(only: str | None, device: str, json_file: Path | None, *, quick: bool) -> None:
     """Measure the speed of this machine: medians of three, some minutes on two cores.
 
@@ -28,14 +30,17 @@ def command(only: str | None, device: str, json_file: Path | None, *, quick: boo
     log; grids: making them; training: of networks, against a textbook's float32 loop and against the product of large
     matrices; prediction: with networks, and scoring. Where something is promised, that stands beside the number.
     """
+    from semgrid_eval.bench.measurement import FULL, QUICK
     from semgrid_eval.bench.suite import PARTS, conditions, load, measure
+    from semgrid_eval.executors import available_cores
+    from semgrid_eval.files import write_json
     from semgrid_eval.models.device import choose_device
 
     parts = PARTS if only is None else [part.strip() for part in only.split(",")]
     chosen = choose_device(device)
     here = conditions(chosen)
     if load() > _BUSY * available_cores():
-        say(f"Warning: this machine has other work (load {here['load']}); measured speeds are lower than its own")
+        complain(f"Warning: this machine has other work (load {here['load']}); measured speeds are lower than its own")
     with progress("measure") as watch:
         found = measure(parts, QUICK if quick else FULL, device=chosen, progress=watch)
     if json_file:
@@ -52,7 +57,7 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
-def _promise(row: Measurement) -> str:
+def _promise(row: "Measurement") -> str:
     if row.kept is None:
         return ""
     return f"at most {row.at_most:g}: {'kept' if row.kept else 'missed'}"

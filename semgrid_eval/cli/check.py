@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from semgrid_eval.cli.console import progress, say
-from semgrid_eval.cli.options import FOLDER, THERE
+from semgrid_eval.cli.console import loudness_options, progress, say
+from semgrid_eval.cli.options import FOLDER, logs_argument
 from semgrid_eval.errors import printable
 
 if TYPE_CHECKING:
@@ -29,8 +29,7 @@ def _print_spec(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
         ctx.exit()
 
 
-@click.command("check", epilog="Example: semgrid-eval check logs")
-@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=THERE)
+@click.command("check", params=[logs_argument()], epilog="Example: semgrid-eval check logs")
 @click.option("--recover", metavar="OUT", type=FOLDER, help="Save what is whole of every LOG in this folder.")
 @click.option("--spec", metavar="FILE", type=_FILE, help="What is expected of the recordings (YAML).")
 @click.option(
@@ -43,8 +42,9 @@ def _print_spec(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
 )
 @click.option("--strict", is_flag=True, help="Refuse warnings, too: a log without checksums, for one.")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+@loudness_options
 def command(logs: tuple[Path, ...], recover: Path | None, spec: Path | None, *, strict: bool, as_json: bool) -> int:
-    """Check logs: every LOG that is a file, and all logs below every LOG that is a folder.
+    """Check logs: every LOG that is a file, all logs below every LOG that is a folder; LOG may be a pattern in quotes.
 
     Looks at all checksums, decodes every label and disparity image, and compares channels, counts, times, calibration
     and motion with what is expected of a recording. One line a finding.

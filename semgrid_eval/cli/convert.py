@@ -2,46 +2,35 @@
 
 from inspect import cleandoc
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from semgrid_eval.cli.console import progress, say
-from semgrid_eval.cli.options import FOLDER, chosen_executor, executor_options, parameters_of, workers_option
-from semgrid_eval.config import parse_config
-from semgrid_eval.errors import InputError, MissingExtraError
+from semgrid_eval.cli.console import loudness_options, progress
+from semgrid_eval.cli.converted import show
+from semgrid_eval.cli.groups import TableGroup
+from semgrid_eval.cli.options import FOLDER, chosen_executor, executor_options, workers_option
 from semgrid_eval.sources.known import SOURCES, Source, load_source
 
-if TYPE_CHECKING:
-    from semgrid_eval.log.convert import ConversionSummary
+
+def _summaries() -> dict[str, str]:
+    return {name: known.summary for name, known in SOURCES.items()}
 
 
-class _Sources(click.Group):
-    """Imports a source only when its command is asked for."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(SOURCES)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in SOURCES:
-            return None
-        try:
-            return command_of(cmd_name, load_source(cmd_name))
-        except MissingExtraError as error:
-            return _not_installed(cmd_name, error)
-
-
-@click.group("convert", cls=_Sources)
+@click.group("convert", cls=TableGroup, table=_summaries, load=lambda name: command_of(name, load_source(name)))
 def command() -> None:
     """Convert recordings to MCAP logs, one log a recording."""
 
 
 def command_of(name: str, source: Source[Any]) -> click.Command:
     """Make the command of a source."""
+    from semgrid_eval.cli.fields import parameters_of
 
     @workers_option("Logs at once.")
     @executor_options
+    @loudness_options
     def convert(out: Path, workers: int, executor: str, address: str, **given: Any) -> int:  # noqa: ANN401 - options
+        from semgrid_eval.config import parse_config
         from semgrid_eval.log.convert import Work
 
         work = Work(workers, chosen_executor(executor, address, workers), given.pop("cache", None), progress)
@@ -52,47 +41,3 @@ def command_of(name: str, source: Source[Any]) -> click.Command:
         parameters.append(click.Option(["--cache"], type=FOLDER, help=source.cache))
     made = click.command(name, params=parameters, help=cleandoc(source.help), epilog=f"Example: {source.example}")
     return made(convert)
-
-
-def show(summary: "ConversionSummary", out: Path) -> int:
-    """Print what became of a conversion, and return the exit code."""
-    for label, reason in summary.failed.items():
-        say(f"Error: {label}: {reason}")
-    say(f"{out}: {len(summary.written)} written, {len(summary.skipped)} up to date, {len(summary.failed)} failed")
-    others = _strays(out, summary)
-    if others:
-        say(f"Warning: {out} holds {len(others)} logs that do not belong to this conversion, such as {others[0]}")
-    if summary.remark:
-        say(summary.remark)
-    return 1 if summary.failed else 0
-
-
-def _strays(out: Path, summary: "ConversionSummary") -> list[Path]:
-    """Return the logs that a conversion neither wrote nor found there.
-
-    Unless it is for all splits, those of other splits do not count: each may be converted by a command of its own.
-    """
-    from semgrid_eval.log.store import find_logs, label_of
-
-    splits = {label.split("/")[0] for label in summary.labels}
-    try:
-        logs = find_logs(out)
-    except InputError:  # every recording failed
-        return []
-    others = {label_of(log, out): log for log in logs if label_of(log, out) not in summary.labels}
-    return [log for label, log in others.items() if summary.all_splits or label.split("/")[0] in splits]
-
-
-def _not_installed(name: str, missing: MissingExtraError) -> click.Command:
-    """Stand in for a command whose packages are missing, so that the help of the others still works."""
-
-    def refuse() -> None:
-        raise missing
-
-    return click.Command(
-        name,
-        callback=refuse,
-        short_help=f"({missing})",
-        add_help_option=False,
-        context_settings={"ignore_unknown_options": True, "allow_extra_args": True},
-    )

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import click
 
-from semgrid_eval.cli.console import command_line, progress, say
+from semgrid_eval.cli.console import command_line, loudness_options, progress, say
+from semgrid_eval.cli.converted import show
 from semgrid_eval.cli.options import FOLDER, device_option, workers_option
-from semgrid_eval.config import parse_config
-from semgrid_eval.executors import local_executor
 
 PRESET = "demo"
 TOWNS = 8
@@ -21,19 +20,21 @@ TOWNS = 8
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
 @device_option
 @workers_option("Processes at once.")
+@loudness_options
 def command(out: Path, recordings: int, seed: int, device: str, workers: int) -> int:
     """Simulate a town, record drives through it as logs, train, score and report: a few minutes on two cores.
 
     Prints the path of the finished page. Finished work is kept; run the same command again to continue.
     """
-    from semgrid_eval.cli.convert import show
     from semgrid_eval.cli.run import show_run
+    from semgrid_eval.config import parse_config
+    from semgrid_eval.executors import local_executor
     from semgrid_eval.log.convert import Work
     from semgrid_eval.report.page.write import write_report
     from semgrid_eval.runs.matrix import load_matrix
     from semgrid_eval.runs.runner import RunOptions, run_matrix
+    from semgrid_eval.sources.town.config import SyntheticConfig
     from semgrid_eval.sources.town.convert import convert_town
-    from semgrid_eval.sources.town.recordings import SyntheticConfig
 
     start_s = time.monotonic()
     logs, run = out / "logs", out / "run"

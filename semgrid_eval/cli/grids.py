@@ -4,9 +4,8 @@ from pathlib import Path
 
 import click
 
-from semgrid_eval.cli.console import progress, say
+from semgrid_eval.cli.console import complain, loudness_options, progress, say
 from semgrid_eval.cli.options import FOLDER, THERE, chosen_executor, executor_options, workers_option
-from semgrid_eval.config import load_yaml, parse_config
 
 
 @click.command("grids", epilog="Example: semgrid-eval grids logs grids")
@@ -15,11 +14,13 @@ from semgrid_eval.config import load_yaml, parse_config
 @click.option("--config", type=click.Path(path_type=Path, dir_okay=False), help="Grid configuration (YAML).")
 @workers_option("Logs at once.")
 @executor_options
+@loudness_options
 def command(logs: Path, out: Path, config: Path | None, workers: int, executor: str, address: str) -> int:
     """Build the semantic grids of all LOGS into the folder OUT.
 
     Each recording is built once for a configuration and found again by the digest of log and configuration.
     """
+    from semgrid_eval.config import load_yaml, parse_config
     from semgrid_eval.grids.build import build_grids
     from semgrid_eval.grids.spec import GridConfig
     from semgrid_eval.log.store import find_logs
@@ -29,6 +30,6 @@ def command(logs: Path, out: Path, config: Path | None, workers: int, executor: 
     with progress("grids") as watch:
         data = build_grids(find_logs(logs), out, grid_config, executor=work_on, progress=watch)
     for reason in data.failed.values():
-        say(f"Error: {reason}")
+        complain(f"Error: {reason}")
     say(f"{len(data.recordings)} recordings in {out}: {data.built} logs built, {data.reused} re-used")
     return 1 if data.failed else 0

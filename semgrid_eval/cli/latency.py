@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from semgrid_eval.cli.console import command_line, progress, say
-from semgrid_eval.cli.options import FOLDER, THERE, device_option, parameters_of
+from semgrid_eval.cli.console import command_line, loudness_options, progress, say
+from semgrid_eval.cli.fields import parameters_of
+from semgrid_eval.cli.options import FOLDER, device_option, logs_argument
 from semgrid_eval.config import parse_config
 from semgrid_eval.segmentation.config import SegmentationConfig
 
@@ -26,7 +27,7 @@ _SHOWN = ("processor", "cores", "threads", "device", "gpu", "clock")
 @click.command(
     "latency",
     params=[
-        click.Argument(["logs"], metavar="LOG...", nargs=-1, required=True, type=THERE),
+        logs_argument(),
         click.Option(["--model", "models"], multiple=True, help=_MODEL),
         click.Option(["--segment"], type=_ONNX, help=_SEGMENT),
         *parameters_of(SegmentationConfig),
@@ -42,6 +43,7 @@ _SHOWN = ("processor", "cores", "threads", "device", "gpu", "clock")
     epilog="Example: semgrid-eval latency logs/val --model fuse --frames 100 --out profile.json",
 )
 @device_option
+@loudness_options
 def command(logs: tuple[Path, ...], out: Path, frames: int, warm_up: int, **given: Any) -> None:  # noqa: ANN401
     """Measure what each stage of a chain takes on this machine, and write the times of all frames to a profile.
 

@@ -13,26 +13,35 @@ from typing import Any, NoReturn
 import click
 
 from semgrid_eval import __version__
+from semgrid_eval.cli.groups import TableGroup
 from semgrid_eval.errors import SemgridError, printable
 
-_COMMANDS = ("convert", "check", "segment", "grids", "run", "report", "play", "demo", "bench", "latency")
-"""Modules of `semgrid_eval.cli`."""
+COMMANDS = {
+    "demo": "All of the below on a simulated town, in some minutes.",
+    "convert": "Recordings to logs: Cityscapes, a simulated town.",
+    "check": "Is a log whole and plausible? Saves what is whole of it.",
+    "segment": "Label images for logs, by a segmentation network.",
+    "grids": "Logs to semantic grids, each made once.",
+    "run": "Train and score the rows of a matrix.",
+    "report": "A run's page, tables and figures.",
+    "play": "What a row predicted, as a log for viewers.",
+    "cache": "Which grids and towns are kept; removes unused ones.",
+    "latency": "How long a perception chain takes on this machine.",
+    "bench": "How fast everything is on this machine.",
+}
+"""Modules of `semgrid_eval.cli`, each with its line of `--help`."""
 _GO_ON = ("convert", "segment", "grids", "run", "demo")
 """Commands that keep what is done, so that after a stop they need not begin again."""
 
 
-class _LazyGroup(click.Group):
-    """Imports a command only when it is asked for, so that `--help` and `check` do not wait for torch."""
+def _load(name: str) -> click.Command:
+    command = importlib.import_module(f"semgrid_eval.cli.{name}").command
+    assert isinstance(command, click.Command)
+    return command
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(_COMMANDS)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in _COMMANDS:
-            return None
-        command = importlib.import_module(f"semgrid_eval.cli.{cmd_name}").command
-        assert isinstance(command, click.Command)
-        return command
+class _Commands(TableGroup):
+    """All commands; one that is stopped says whether it goes on from there."""
 
     def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 - whatever a command returns
         try:
@@ -42,7 +51,12 @@ class _LazyGroup(click.Group):
             raise click.Abort(what_next) from error
 
 
-@click.group(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    cls=_Commands,
+    table=lambda: COMMANDS,
+    load=_load,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.version_option(__version__, prog_name="semgrid-eval")
 def cli() -> None:
     """Evaluate short-term prediction on semantic grids, from recorded MCAP logs."""

@@ -1,69 +1,64 @@
-"""Options of commands: from the fields of a configuration, and those that say where the work is done."""
+"""Options of several commands, most of which say where the work is done."""
 
-from collections.abc import Callable, Iterator, Sequence
+import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import NoneType
-from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING
 
 import click
-from pydantic.fields import FieldInfo
 
-from semgrid_eval.apart import Limits
-from semgrid_eval.config import Config
-from semgrid_eval.executors import Executor, available_cores, local_executor
-from semgrid_eval.ray_executor import LOCAL, RayExecutor
+from semgrid_eval.cli.console import Command
+from semgrid_eval.workplace import LOCAL, Limits
+
+if TYPE_CHECKING:
+    from semgrid_eval.executors import Executor
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
 THERE = click.Path(path_type=Path, exists=True)
 WORKERS = click.IntRange(1, 256)
-Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class _Pattern(click.Path):
+    """A path that exists, or a pattern such as 'logs/*.mcap' where no shell has put names in its place."""
+
+    def convert(  # type: ignore[override] # several paths for one word
+        self, value: "str | os.PathLike[str]", param: click.Parameter | None, ctx: click.Context | None
+    ) -> list[Path]:
+        from glob import glob
+
+        pattern = os.fspath(value)
+        if not any(sign in pattern for sign in "*?[") or Path(pattern).exists():
+            super().convert(value, param, ctx)
+            return [Path(pattern)]
+        found = sorted(map(Path, glob(pattern, recursive=True)))  # noqa: PTH207 - absolute patterns, too
+        if not found:
+            self.fail(f"Nothing matches {pattern!r}.", param, ctx)
+        return found
+
+
+def logs_argument() -> click.Argument:
+    """Make the argument LOG...: logs, folders of logs and patterns of either, all of which exist."""
+
+    def flat(ctx: click.Context, option: click.Parameter, given: Sequence[Sequence[Path]]) -> tuple[Path, ...]:
+        return tuple(dict.fromkeys(path for each in given for path in each))
+
+    return click.Argument(
+        ["logs"], metavar="LOG...", nargs=-1, required=True, type=_Pattern(exists=True), callback=flat
+    )
+
+
 device_option = click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 
 
-def parameters_of(config: type[Config]) -> Iterator[click.Parameter]:
-    """Make an option for each field of a configuration, and an argument for a path without default.
+def _all_cores() -> int:
+    from semgrid_eval.executors import available_cores
 
-    Fields are numbers, words, paths, flags, `Literal` of words, tuples of a fixed length of such, or of any length
-    (`tuple[str, ...]`: the option may be given several times). Limits are for the configuration to check.
-    """
-    for name, field in config.model_fields.items():
-        kind = _plain(field.annotation)
-        if kind is Path and field.is_required():
-            yield click.Argument([name], type=click.Path(path_type=Path, exists=True))
-        else:
-            yield click.Option([f"--{name.replace('_', '-')}", name], **_settings(kind, field))
-
-
-def _settings(kind: Any, field: FieldInfo) -> dict[str, Any]:  # noqa: ANN401 - a type
-    settings = {"help": field.description, "required": field.is_required()}
-    if kind is bool:
-        return {**settings, "is_flag": True}
-    if not field.is_required() and field.default is not None:
-        settings |= {"default": field.default, "show_default": field.default != ()}
-    if get_origin(kind) is tuple:
-        first, *others = get_args(kind)
-        many = {"multiple": True} if Ellipsis in others else {"nargs": 1 + len(others)}
-        return {**settings, **many, "type": _value_type(_plain(first))}
-    return {**settings, "type": _value_type(kind)}
-
-
-def _value_type(kind: Any) -> Any:  # noqa: ANN401 - types
-    if get_origin(kind) is Literal:
-        return click.Choice(get_args(kind))
-    return click.Path(path_type=Path, exists=True) if kind is Path else kind
-
-
-def _plain(annotation: Any) -> Any:  # noqa: ANN401 - a type annotation
-    """Take a type out of `Annotated` and `... | None`."""
-    if get_origin(annotation) is Annotated:
-        return _plain(get_args(annotation)[0])
-    choices = [each for each in get_args(annotation) if each is not NoneType]
-    return _plain(choices[0]) if NoneType in get_args(annotation) and len(choices) == 1 else annotation
+    return available_cores()
 
 
 def workers_option(text: str) -> Callable[[Command], Command]:
     """Return the option --workers, which is all cores unless given."""
-    return click.option("--workers", type=WORKERS, default=available_cores(), show_default="all cores", help=text)
+    return click.option("--workers", type=WORKERS, default=_all_cores, show_default="all cores", help=text)
 
 
 def executor_options(command: Command) -> Command:
@@ -102,7 +97,7 @@ def own_model_options(command: Command) -> Command:
 
 def chosen_executor(
     name: str, address: str, workers: int, *, gpus: float = 0.0, shared: Sequence[str] = ()
-) -> Executor:
+) -> "Executor":
     """Make the executor that options ask for, `local` or `ray`.
 
     `gpus` are for each piece of work on Ray, `shared` the GPUs that local processes share, as CUDA names them.
@@ -111,6 +106,9 @@ def chosen_executor(
         MissingExtraError: Ray is asked for and not installed.
         InputError: the cluster cannot be reached, or never has what a piece of work asks for.
     """
+    from semgrid_eval.executors import local_executor
+    from semgrid_eval.ray_executor import RayExecutor
+
     if name == LOCAL:
         return local_executor(workers, gpus=shared)
     return RayExecutor(address, gpus=gpus, local_cpus=workers if address == LOCAL else None)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from semgrid_eval.cli.console import progress, say
+from semgrid_eval.cli.console import loudness_options, progress, say
 
 
 @click.command("play", epilog="Example: semgrid-eval play runs/first BL-DC --out play.mcap --logs logs")
@@ -16,6 +16,7 @@ from semgrid_eval.cli.console import progress, say
 @click.option("--all", "every_recording", is_flag=True, help="Play all recordings, one after the other.")
 @click.option("--stream", "live", is_flag=True, help="Play a stream as a viewer would have seen it live.")
 @click.option("--force", is_flag=True, help="Replace --out and the layout beside it, whatever they are.")
+@loudness_options
 def command(
     run: Path,
     row: str,

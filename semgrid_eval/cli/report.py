@@ -1,11 +1,21 @@
 """`semgrid-eval report`: the page, tables and figures of a run."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
-from semgrid_eval.cli.console import progress, say
+from semgrid_eval.cli.console import complain, loudness_options, progress, say
+
+if TYPE_CHECKING:
+    from semgrid_eval.report.estimates.gate import Limit
+
+
+_FAIL_BELOW = (
+    "As 'vehicles: -0.01': exit code 1 where a row of the second of two RUNs is clearly below by more than this."
+)
+_ROW = "Hold this row alone to --fail-below, or rows like 'BL-*', or NAME=OTHER; may be repeated."
 
 
 @click.command("report", epilog="Example: semgrid-eval report runs/first")
@@ -18,18 +28,53 @@ from semgrid_eval.cli.console import progress, say
     show_default=True,
     help="What intervals resample first: recordings, or the towns, cities or drives that they belong to.",
 )
-def command(runs: tuple[Path, ...], out: Path | None, resample: Literal["recordings", "groups"]) -> int:
+@click.option("--fail-below", "limits", metavar="COLUMN:DIFFERENCE", multiple=True, help=_FAIL_BELOW)
+@click.option("--row", "rows", multiple=True, help=_ROW)
+@loudness_options
+def command(
+    runs: tuple[Path, ...],
+    out: Path | None,
+    resample: Literal["recordings", "groups"],
+    limits: tuple[str, ...],
+    rows: tuple[str, ...],
+) -> int:
     """Write one self-contained HTML page, CSV tables and figures from what RUN left on disk.
 
     Prints the path of the page. Several runs are shown side by side, with their differences. Files of RUN that are
     damaged or lost are named, here and on the page, and the exit code is then 1.
+
+    --fail-below makes a gate of two runs, an earlier and a later one. Rows are paired by name; the difference of their
+    IoU is taken recording by recording, and a limit fails where the whole interval lies below it. It may be repeated,
+    with classes (road), categories (vehicles) and their mean (mean_known). Rows with other targets are refused.
     """
+    from semgrid_eval.report.estimates.gate import parse_limit
     from semgrid_eval.report.page.write import write_report  # here, so that `--help` does not wait for matplotlib
 
+    if limits and len(runs) != 2:
+        raise click.UsageError("--fail-below compares two runs, an earlier and a later one")
+    if rows and not limits:
+        raise click.UsageError("--row says what --fail-below compares")
+    kept = [parse_limit(each) for each in limits]
     damages = list[str]()
     with progress("reading results") as shown:
         page = write_report(runs, out, resample=resample, progress=shown, damaged=damages.append)
     for damage in damages:
-        say(f"Error: {damage}")
+        complain(f"Error: {damage}")
     click.echo(page)
-    return 1 if damages else 0
+    holds = _hold(runs[0], runs[1], kept, rows, resample) if kept else True
+    return 1 if damages or not holds else 0
+
+
+def _hold(
+    before: Path, after: Path, limits: "Sequence[Limit]", rows: Sequence[str], level: Literal["recordings", "groups"]
+) -> bool:
+    """Say of each row and limit whether it holds, and return whether all do."""
+    from semgrid_eval.report.estimates.gate import check_gate
+
+    with progress("gate") as shown:
+        gate = check_gate((before, after), limits, rows=rows, level=level, progress=shown)
+    for name in gate.missing:
+        complain(f"Warning: row {name} of {before} is not in {after}: it is not compared")
+    for verdict in gate.verdicts:
+        say(f"gate: {verdict}") if verdict.holds else complain(f"Error: gate: {verdict}")
+    return gate.holds

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from semgrid_eval.cli.console import command_line, progress, say
+from semgrid_eval.cli.console import command_line, complain, loudness_options, progress, say
 from semgrid_eval.cli.options import (
     FOLDER,
     THERE,
@@ -17,8 +17,7 @@ from semgrid_eval.cli.options import (
     workers_option,
 )
 from semgrid_eval.errors import printable
-from semgrid_eval.executors import local_executor
-from semgrid_eval.ray_executor import LOCAL
+from semgrid_eval.workplace import LOCAL
 
 if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.runs.matrix import Matrix
@@ -48,6 +47,7 @@ _MODEL = "One more row: a model of your own, path.py:Class, or an installed one.
     "--pictures/--no-pictures", default=True, show_default=True, help="Keep small pictures for the report's examples."
 )
 @click.option("--dry-run", is_flag=True, help="Only say what would be done and how long it would take.")
+@loudness_options
 def command(
     matrix: str,
     logs: Path,
@@ -83,6 +83,7 @@ def command(
 
     --dry-run builds the grids, which a run then finds, times a few updates of each network, and prints the plan.
     """
+    from semgrid_eval.executors import local_executor
     from semgrid_eval.models.device import visible_gpus
     from semgrid_eval.models.memory import guest_limits
     from semgrid_eval.models.registry import own_models as run_own_models
@@ -117,9 +118,9 @@ def show_run(record: "RunRecord", rows: Collection[str]) -> int:
     """Print which of the named rows and which logs failed, and return the exit code."""
     failed = [row for row in record.rows if row.failure and row.name in rows]
     for row in failed:
-        say(f"Error: row {row.name}: {row.failure}")
+        complain(f"Error: row {row.name}: {row.failure}")
     for reason in record.failed_logs.values():
-        say(f"Error: {reason}")
+        complain(f"Error: {reason}")
     return 1 if record.failed_logs or failed else 0
 
 

@@ -5,9 +5,10 @@ from typing import Any
 
 import click
 
-from semgrid_eval.cli.console import progress
-from semgrid_eval.cli.convert import show
-from semgrid_eval.cli.options import FOLDER, THERE, WORKERS, parameters_of
+from semgrid_eval.cli.console import loudness_options, progress
+from semgrid_eval.cli.converted import show
+from semgrid_eval.cli.fields import parameters_of
+from semgrid_eval.cli.options import FOLDER, WORKERS, logs_argument
 from semgrid_eval.config import parse_config
 from semgrid_eval.segmentation.config import SegmentationConfig
 
@@ -18,7 +19,7 @@ _SHARED = "Logs at once; they share the cores, all of which one log can use."
 @click.command(
     "segment",
     params=[
-        click.Argument(["logs"], metavar="LOG...", nargs=-1, required=True, type=THERE),
+        logs_argument(),
         click.Option(["--model"], required=True, type=_MODEL, help="The ONNX file."),
         click.Option(["--out"], required=True, type=FOLDER, help="Folder of the new logs."),
         *parameters_of(SegmentationConfig),
@@ -26,6 +27,7 @@ _SHARED = "Logs at once; they share the cores, all of which one log can use."
     ],
     epilog="Example: semgrid-eval segment logs --model network.onnx --out labelled",
 )
+@loudness_options
 def command(logs: tuple[Path, ...], model: Path, out: Path, workers: int, **options: Any) -> int:  # noqa: ANN401
     """Write logs again as OUT/<split>/<name>.mcap, with label images from a network that sees their colour images.
 

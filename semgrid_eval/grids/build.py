@@ -195,11 +195,20 @@ def _read(log: Path, folder: Path, config: GridConfig) -> list[GridRecording]:
 
 
 def _cache_file(log: Path, folder: Path, config: GridConfig) -> tuple[Path, str]:
-    """Return where the grids of a log are kept, and the digest of all that decides them, by which they are sealed."""
+    """Return where the grids of a log are kept, and the digest by which they are sealed."""
     with LogReader(log) as reader:
-        decided = {"log": reader.digest, "config": config.model_dump(mode="json"), "format": FORMAT_VERSION}
-    key = digest_value(decided)
-    return folder / f"{log.stem}-{key}.npz", key
+        key = grid_key(reader.digest, config)
+    return folder / grid_file(log.stem, key), key
+
+
+def grid_key(log_digest: str, config: GridConfig) -> str:
+    """Digest all that decides the grids of a log."""
+    return digest_value({"log": log_digest, "config": config.model_dump(mode="json"), "format": FORMAT_VERSION})
+
+
+def grid_file(log: str, key: str) -> str:
+    """Return the name of the file that keeps the grids of a log."""
+    return f"{log}-{key}.npz"
 
 
 def _about(log: Path, error: SemgridError) -> str:

@@ -7,11 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from semgrid_eval.apart import Apart, ApartError, Limits
+from semgrid_eval.apart import Apart, ApartError
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.files import digest_files, digest_value
 from semgrid_eval.models.model import Model
 from semgrid_eval.progress import Progress, silent
+from semgrid_eval.workplace import Limits
 
 _log = logging.getLogger(__name__)
 _GUEST = "semgrid_eval.models.guest"

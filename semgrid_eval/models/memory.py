@@ -8,13 +8,13 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from semgrid_eval.apart import Limits
 from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.device import seeded
 from semgrid_eval.models.model import Given
 from semgrid_eval.models.network import Network, TrainingConfig
 from semgrid_eval.windows.data import WindowBatch
+from semgrid_eval.workplace import Limits
 
 _GIB = 1 << 30
 _WEIGHT_BYTES, _ACTIVATION_BYTES, _INDEX_BYTES = 4, 2, 8  # activations may be bfloat16

@@ -7,13 +7,13 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
-from semgrid_eval.apart import Limits
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.beside import Code, ModelFile, require_python
 from semgrid_eval.models.host import end_guests, known_answers, learn_answers
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.own import guarded, one_line
 from semgrid_eval.models.stand_in import StandIn, stand_in
+from semgrid_eval.workplace import Limits
 
 ENTRY_POINT_GROUP = "semgrid_eval.models"
 _HERE = "semgrid_eval.models"

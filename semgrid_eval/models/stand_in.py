@@ -9,7 +9,6 @@ import torch
 from pydantic import ConfigDict
 from torch import Tensor
 
-from semgrid_eval.apart import Limits
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError
@@ -20,6 +19,7 @@ from semgrid_eval.models.model import AnswersIn, Bound, Given, Model
 from semgrid_eval.models.network import Network, NetworkSettings, TrainingConfig
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.windows.data import WindowBatch
+from semgrid_eval.workplace import Limits
 
 if TYPE_CHECKING:
     from semgrid_eval.grids.truth import Truth

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import Field
 
 from semgrid_eval.config import Config, load_yaml, merged, parse_config
-from semgrid_eval.errors import ConfigError, InputError
+from semgrid_eval.errors import ConfigError, InputError, did_you_mean
 from semgrid_eval.models.registry import is_named
 from semgrid_eval.runs.row import Row
 
@@ -85,7 +85,8 @@ def _load(name: str, *above: Path) -> tuple[Path, object]:
     path = above[-1].parent / name if above else Path(name)
     if path.is_file():
         return path, load_yaml(path)
-    fault = f"is neither a file nor a preset ({', '.join(preset_names())})"
+    meant = did_you_mean(name, preset_names())
+    fault = f"is neither a file nor a preset ({', '.join(preset_names())}){meant}"
     if above:
         raise ConfigError(f"{path} {fault}", path=above[-1], field="extends")
     raise ConfigError(fault, path=path)

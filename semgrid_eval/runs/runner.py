@@ -9,7 +9,6 @@ from pathlib import Path
 
 import torch
 
-from semgrid_eval.apart import Limits
 from semgrid_eval.errors import ConfigError, SemgridError, first_line
 from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
 from semgrid_eval.grids.spec import GridConfig
@@ -29,6 +28,7 @@ from semgrid_eval.runs.truth import work_out
 from semgrid_eval.runs.worker import Worker, asks_of_truth
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
+from semgrid_eval.workplace import Limits
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
-from semgrid_eval.config import Config
 from semgrid_eval.errors import MissingExtraError
 
-if TYPE_CHECKING:  # it is heavy, and the help of the commands should not wait for it
+if TYPE_CHECKING:  # they are heavy, and the help of the commands should not wait for them
+    from semgrid_eval.config import Config
     from semgrid_eval.log.convert import ConversionSummary, Work
 
-C = TypeVar("C", bound=Config)
+C = TypeVar("C", bound="Config")
 
 
 @dataclass(frozen=True)
@@ -30,16 +30,17 @@ class Source(Generic[C]):
 
 
 class Known(NamedTuple):
-    """Where a `Source` is found, as `module:name`, and the extra of the package that it needs."""
+    """Where a `Source` is found, as `module:name`, its line of `convert --help`, and the extra its module needs."""
 
     place: str
+    summary: str
     extra: str = ""
 
 
 SOURCES = {
-    "cityscapes": Known("semgrid_eval.sources.cityscapes.tree:SOURCE"),
-    "synthetic": Known("semgrid_eval.sources.town.convert:SOURCE", extra="synthetic"),
-    "town-v1": Known("semgrid_eval.sources.town.convert:TOWN_V1", extra="synthetic"),
+    "cityscapes": Known("semgrid_eval.sources.cityscapes.source:SOURCE", "Sequence trees in Cityscapes' layout."),
+    "synthetic": Known("semgrid_eval.sources.town.source:SYNTHETIC", "Drives through a simulated town."),
+    "town-v1": Known("semgrid_eval.sources.town.source:TOWN_V1", "A frozen data set of the simulated town."),
 }
 
 
@@ -49,13 +50,30 @@ def load_source(name: str) -> Source[Any]:
     Raises:
         MissingExtraError: a package of its extra is not installed.
     """
-    place, extra = SOURCES[name]
+    known = SOURCES[name]
+    found = _imported(known.place, known.extra)
+    assert isinstance(found, Source)
+    return found
+
+
+def later(place: str, extra: str = "") -> "Callable[[Any, Path, Work], ConversionSummary]":
+    """Return the `convert` of a source, `module:name`, that is imported when it is called: no help waits for it.
+
+    Where a package of `extra` is not installed, the call raises a MissingExtraError.
+    """
+
+    def convert(options: "Config", out: Path, work: "Work") -> "ConversionSummary":
+        done: ConversionSummary = _imported(place, extra)(options, out, work)
+        return done
+
+    return convert
+
+
+def _imported(place: str, extra: str) -> Any:  # noqa: ANN401 - what stands there
     module, _, attribute = place.partition(":")
     try:
-        found = getattr(importlib.import_module(module), attribute)
+        return getattr(importlib.import_module(module), attribute)
     except ModuleNotFoundError as error:
         if not extra:
             raise
         raise MissingExtraError(extra, error.name or "a package") from error
-    assert isinstance(found, Source)
-    return found

@@ -5,6 +5,7 @@ import shlex
 import pytest
 from click.testing import CliRunner
 
+from semgrid_eval.bench import measurement
 from semgrid_eval.bench.measurement import Settings
 from semgrid_eval.bench.suite import PARTS
 from semgrid_eval.cli import bench
@@ -25,7 +26,7 @@ TINY = Settings(
 
 @pytest.fixture
 def tiny(monkeypatch):
-    monkeypatch.setattr(bench, "QUICK", TINY)
+    monkeypatch.setattr(measurement, "QUICK", TINY)
 
 
 def test_every_part_is_measured_printed_and_written(tiny, tmp_path):

@@ -6,10 +6,12 @@ import threading
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from support.cityscapes_tree import Tree
 from support.driving import driving
 
-from semgrid_eval.cli.main import main
+import semgrid_eval
+from semgrid_eval.cli.main import cli, main
 from semgrid_eval.log.store import write_log
 
 LIMIT_S = 60
@@ -47,17 +49,22 @@ def told_at_termination(process):
     return process.returncode, said.strip()
 
 
-def test_help_does_not_wait_for_heavy_packages():
-    program = """
-import sys
-from semgrid_eval.cli.main import cli
-cli.main(["--help"], standalone_mode=False)
-print(sorted({"numpy", "pandas", "torch", "cv2"} & sys.modules.keys()))
-"""
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    *shown, heavy = done.stdout.splitlines()
-    assert heavy == "[]"
-    assert sum(line.startswith("  ") for line in shown) > 9  # every command, with a line of help
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [(("repot", "runs/first"), "report"), (("convert", "town-v2", "logs"), "town-v1"), (("qqq",), None)],
+)
+def test_a_misspelt_command_is_told_which_was_meant(words, meant):
+    done = CliRunner().invoke(cli, words)
+    assert done.exit_code == 2
+    last = done.output.splitlines()[-1]
+    name = next(word for word in words if word != "convert")
+    assert last == f"Error: No such command {name!r}" + (f"; did you mean {meant!r}?" if meant else ".")
+
+
+def test_the_package_runs_as_the_command_does():
+    for module in ("semgrid_eval", "semgrid_eval.cli.main"):
+        done = subprocess.run([sys.executable, "-m", module, "--version"], capture_output=True, text=True, check=True)
+        assert done.stdout == f"semgrid-eval, version {semgrid_eval.__version__}\n"
 
 
 def test_a_terminated_conversion_leaves_nothing_half_written_and_says_that_it_goes_on(tmp_path):

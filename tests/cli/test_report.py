@@ -77,3 +77,45 @@ def test_a_file_of_another_result_is_not_taken_for_ones_own(tmp_path, capsys, na
     code, _, err = _run(capsys, "report", run)
     assert code == 1
     assert f"{name}: belongs to another id ({other.name}, not {one.name})" in err
+
+
+@pytest.fixture(scope="module")
+def before_and_after(tmp_path_factory):
+    """Two runs with the same rows, of which one has got worse."""
+    folder = tmp_path_factory.mktemp("gate")
+    for name, wrong in (("before", 0.06), ("after", 0.3)):
+        rows = (FakeRow("DC", "BL"), FakeRow("DC", "ED", wrong, 1))
+        make_fake_run(folder / name, rows=rows, recordings=4, windows=1)
+    return folder / "before", folder / "after"
+
+
+def test_a_gate_that_fails_is_exit_code_1_with_a_line_for_each_limit_and_the_page(before_and_after, tmp_path, capsys):
+    limits = ("--fail-below", "mean_known: -0.01", "--fail-below", "road:-1")
+    code, out, err = _run(capsys, "report", *before_and_after, *limits, "--out", tmp_path / "page")
+    assert code == 1
+    assert Path(out.strip()).is_file()
+    lines = [line for line in err.splitlines() if "gate: " in line and "/" not in line]
+    assert [line.split("] ")[1] for line in lines] == [
+        *("holds -0.0100", "holds -1.0000"),
+        *("is clearly below -0.0100", "holds -1.0000"),
+    ]
+    assert [line.startswith("Error: gate: ED-DC, mean_known: -0.") for line in lines] == [False, False, True, False]
+
+
+def test_a_gate_that_holds_is_exit_code_0(before_and_after, tmp_path, capsys):
+    held = ("--fail-below", "mean_known: -0.01", "--out", tmp_path / "page")
+    assert _run(capsys, "report", *reversed(before_and_after), *held)[0] == 0
+    assert _run(capsys, "report", *before_and_after, *held, "--row", "BL-*", "-q")[::2] == (0, "")
+
+
+def test_a_gate_that_asks_for_what_is_not_there_is_refused(before_and_after, tmp_path, capsys):
+    before, after = before_and_after
+    code, out, err = _run(capsys, "report", before, after, "--fail-below", "cars: -0.01", "--out", tmp_path / "page")
+    assert (code, out) == (1, "")
+    assert err.startswith("Error: fail-below: 'cars' is not one of unknown, road, ")
+    assert err.endswith("did you mean 'car'?\n")
+    for arguments in ((before, "--fail-below", "car: 0"), (before, after, "--row", "ED-DC")):
+        code, out, err = _run(capsys, "report", *arguments, "--out", tmp_path / "page")
+        assert (code, out) == (2, "")
+        assert "--fail-below" in err
+    assert not (tmp_path / "page").exists()

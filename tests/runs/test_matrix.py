@@ -168,7 +168,7 @@ def test_an_installed_model_is_a_row_and_is_looked_for_only_where_one_is_asked_f
 
 
 def test_a_name_that_is_neither_file_nor_preset_lists_the_presets():
-    with pytest.raises(ConfigError, match=r"papre: is neither a file nor a preset \(.*paper.*\)"):
+    with pytest.raises(ConfigError, match=r"papre: is neither a file nor a preset \(.*\); did you mean 'paper'\?$"):
         load_matrix("papre")
 
 

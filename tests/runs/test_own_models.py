@@ -6,12 +6,12 @@ import pytest
 import torch
 from support.small_runs import run, write_logs
 
-from semgrid_eval.apart import Limits
 from semgrid_eval.executors import Processes
 from semgrid_eval.models import fitting
 from semgrid_eval.models.registry import ENTRY_POINT_GROUP, own_models
 from semgrid_eval.scores import results
 from semgrid_eval.scores.metrics.iou import category_iou, class_iou
+from semgrid_eval.workplace import Limits
 
 NETWORK = """
 import torch

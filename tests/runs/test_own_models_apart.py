@@ -7,10 +7,10 @@ import pytest
 import torch
 from support.small_runs import run, write_logs
 
-from semgrid_eval.apart import Limits
 from semgrid_eval.executors import Processes
 from semgrid_eval.models.registry import described, own_models
 from semgrid_eval.scores import results
+from semgrid_eval.workplace import Limits
 
 RUDE = """
 import ctypes, os, signal, sys, time

@@ -18,7 +18,7 @@ from semgrid_eval.errors import MissingExtraError
 from semgrid_eval.log.convert import convert_recordings
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
-from semgrid_eval.sources.known import SOURCES, Known, Source, load_source
+from semgrid_eval.sources.known import SOURCES, Known, Source, later, load_source
 
 
 class BagOptions(Config):
@@ -45,7 +45,7 @@ BAGS = Source(BagOptions, convert_bags, help="Convert bags.", example="semgrid-e
 def bags(monkeypatch, tmp_path):
     """Add the source of this file to the table, and go where a folder of bags is."""
     monkeypatch.setitem(sys.modules, "bags_of_test", SimpleNamespace(SOURCE=BAGS))
-    monkeypatch.setitem(SOURCES, "bags", Known("bags_of_test:SOURCE"))
+    monkeypatch.setitem(SOURCES, "bags", Known("bags_of_test:SOURCE", "Bags to logs."))
     monkeypatch.chdir(tmp_path)
     Path("drive").mkdir()
 
@@ -55,7 +55,7 @@ def convert(*arguments):
 
 
 def test_a_source_in_the_table_is_a_command_with_the_options_of_its_fields(bags):
-    assert "bags        Convert bags." in convert("--help").output
+    assert "bags        Bags to logs." in convert("--help").output
     done = convert("bags", "drive", "logs", "--count", "3", "--kind", "ros1")
     assert done.output.endswith("logs: 3 written, 0 up to date, 0 failed\n")
     with LogReader(find_logs(Path("logs"))[0]) as log:
@@ -80,9 +80,18 @@ def test_every_source_says_what_its_command_does_and_how_it_is_used(name):
 
 
 def test_a_source_whose_package_is_missing_names_its_extra(monkeypatch):
-    monkeypatch.setitem(SOURCES, "bags", Known("no_such_package:SOURCE", extra="bags"))
+    monkeypatch.setitem(SOURCES, "bags", Known("no_such_package:SOURCE", "Bags.", extra="bags"))
     with pytest.raises(MissingExtraError, match=r"no_such_package is not installed; .*semgrid-eval\[bags\]"):
         load_source("bags")
+    assert "Bags." in convert("--help").output
+    assert isinstance(convert("bags", "--help").exception, MissingExtraError)
+
+
+def test_a_source_whose_package_is_needed_only_to_convert_has_its_help_without_it(bags, monkeypatch):
+    source = replace(BAGS, convert=later("no_such_package:convert", extra="bags"))
+    monkeypatch.setitem(sys.modules, "bags_of_test", SimpleNamespace(SOURCE=source))
+    assert "--count" in convert("bags", "--help").output
+    assert "pip install 'semgrid-eval[bags]'" in str(convert("bags", "drive", "logs").exception)
 
 
 @pytest.mark.parametrize("module", ["sources.benchmarks", "sources.known", "report.page.write"])

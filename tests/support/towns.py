@@ -5,7 +5,8 @@ import tempfile
 from pathlib import Path
 
 from semgrid_eval.progress import silent
-from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
+from semgrid_eval.sources.town.config import SyntheticConfig
+from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import RecordingPlan
 
 SMALL = {"recordings": 4, "seed": 3, "towns": 2, "val_share": 0.25, "town_size_m": 250.0, "duration_s": 15.0}

@@ -24,43 +24,16 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
 
-from pydantic import Field
-
-from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.sources.cityscapes.sequence import CityscapesSequence, SequenceFrame, frame_name, sibling
-from semgrid_eval.sources.known import Source
+from semgrid_eval.sources.cityscapes.source import CityscapesOptions
 
 RECORDING_FRAMES = 30
-CAMERA_NAME = "front"
 _IMAGES = "leftImg8bit_sequence"
 _CAMERA_NAME = re.compile(r"[A-Za-z0-9_-]+")
 _IMAGE_NAME = re.compile(r"(?P<sequence>.+_[0-9]+)_(?P<number>[0-9]+)_leftImg8bit\.png")
-_LABELS = "Folder of label images whose names begin with the frame's, anywhere below it; else gtFine is used."
-_HELP = """Convert the Cityscapes sequence tree SRC to logs OUT/<split>/<city>_<sequence>_<first frame>.mcap.
-
-SRC holds leftImg8bit_sequence, disparity_sequence, vehicle_sequence, timestamp_sequence and camera (for each frame
-or one of a sequence). Where frame numbers break off inside a stretch of 30 a frame is lost, elsewhere another log
-begins.
-
-A recording fails as a whole, named with the file at fault, if a frame is lost, a file is missing, broken or
-impossible, camera files differ, time stamps do not grow, or a picture has another size or bit depth: windows count
-frames, so none may be dropped. Frames without a label image are allowed. The other recordings are converted; the
-exit code is then 1. Logs whose inputs have not changed are left as they are.
-"""
-
-
-class CityscapesOptions(Config):
-    """Which recordings of which tree, and how its label images are to be read."""
-
-    src: Path
-    labels: Annotated[Path | None, Field(description=_LABELS)] = None
-    train_ids: Annotated[bool, Field(description="Label images hold train ids instead of label ids.")] = False
-    split: Annotated[tuple[str, ...], Field(description="Only this split; may be given several times.")] = ()
-    camera_name: Annotated[str, Field(description="Name of the camera in the logs.")] = CAMERA_NAME
 
 
 def find_sequences(options: CityscapesOptions) -> list[CityscapesSequence]:
@@ -200,11 +173,3 @@ def convert_cityscapes(options: CityscapesOptions, out: Path, work: Work = IN_PR
     """
     jobs = [ConversionJob(s.name, s.split, s.digest, s.recording) for s in find_sequences(options)]
     return convert_jobs(jobs, out, work)
-
-
-SOURCE = Source(
-    options=CityscapesOptions,
-    convert=convert_cityscapes,
-    help=_HELP,
-    example="semgrid-eval convert cityscapes cityscapes logs --labels predictions --split val",
-)

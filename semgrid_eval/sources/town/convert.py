@@ -4,37 +4,19 @@ import platform
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
-from pydantic import Field
-
-from semgrid_eval.config import Config
 from semgrid_eval.executors import local_executor
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.log.fingerprint import fingerprints
 from semgrid_eval.log.store import SUFFIX
 from semgrid_eval.packages import installed_versions
 from semgrid_eval.sources.benchmarks import Benchmark, Comparison, SizeName, compare, load_benchmark
-from semgrid_eval.sources.known import Source
-from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
+from semgrid_eval.sources.town.config import CACHE, SizeOptions, SyntheticConfig
+from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import RENDER_VERSION, render_recording
 from semgrid_eval.sources.town.town import TOWN_VERSION
 
-CACHE = ".towns"
-KEPT = f"Folder of towns.  [default: OUT/{CACHE}]"
-_HELP = """Simulate towns and drive through them: logs OUT/<split>/town<NN>_<recording>_000000.mcap.
-
-Traffic comes from Eclipse SUMO, pictures from ray casting with Embree; exact labels, disparity, instances, the pose
-and all road users with their velocities are on topics of their own. Training and validation have different towns.
-Logs that are up to date are left as they are, so the same command can be run again to continue.
-"""
 _PACKAGES = ("numpy", "opencv-python-headless", "eclipse-sumo", "embreex")
-_TOWN_V1_HELP = """Make the frozen data set town-v1 of the simulated town, which is the same everywhere.
-
-It has 300 recordings for training and 120 for validation, or 2,975 and 500 with --size full. The last line says whether
-every recording is the published one. Logs that are up to date are left as they are, so that the same command continues
-after a stop.
-"""
 
 
 def convert_town(
@@ -49,21 +31,6 @@ def convert_town(
         plans = plan_recordings(config, cache, progress, workers=work.workers, dataset=dataset)
     jobs = [ConversionJob(plan.name, plan.split, plan.digest, partial(render_recording, plan)) for plan in plans]
     return convert_jobs(jobs, out, work, label="render")
-
-
-SOURCE = Source(
-    options=SyntheticConfig,
-    convert=convert_town,
-    help=_HELP,
-    example="semgrid-eval convert synthetic logs --recordings 2 --towns 2 --town-size-m 250 --duration-s 15",
-    cache=KEPT,
-)
-
-
-class SizeOptions(Config):
-    """Which size of a benchmark."""
-
-    size: Annotated[SizeName, Field(description="Full is as large as the paper's data.")] = "small"
 
 
 def convert_town_v1(options: SizeOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
@@ -124,12 +91,3 @@ def _verdict(name: str, comparison: Comparison | None, total: int, made_with: Ma
         f"Warning: {name}: {len(comparison.differing)} of {total} recordings differ from the published ones, such as "
         f"{comparison.differing[0]}; digest {comparison.digest}, published {comparison.published}; {why}"
     )
-
-
-TOWN_V1 = Source(
-    options=SizeOptions,
-    convert=convert_town_v1,
-    help=_TOWN_V1_HELP,
-    example="semgrid-eval convert town-v1 logs --size small",
-    cache=KEPT,
-)

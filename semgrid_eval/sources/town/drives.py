@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import Floats
+from semgrid_eval.sources.town.config import FRAME_COUNT
 from semgrid_eval.sources.town.simulation import STEP_S
 from semgrid_eval.sources.town.traffic import CAR_TYPES, Traffic
 
@@ -15,7 +16,6 @@ FRONT_TO_REAR_AXLE_M = 3.8
 SMOOTHING_S = 0.25
 MAX_YAW_RATE_RADPS = 0.6
 _MAX_STEP_M = 1.2  # 20 m/s at 17 Hz; what goes farther was moved by SUMO, not driven
-FRAME_COUNT = 30
 FRAME_RATE_HZ = 17.0
 STANDING_SHARE = 1.0 / 3.0
 STANDING_BELOW_MPS = 2.0

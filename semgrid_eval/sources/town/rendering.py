@@ -16,6 +16,7 @@ from semgrid_eval.recording.types import Actor, Moment, MotionSample, Pose, Reco
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town import drives
 from semgrid_eval.sources.town.bodies import actor_ids, boxes_of, heights_m
+from semgrid_eval.sources.town.config import FRAME_COUNT
 from semgrid_eval.sources.town.picture_errors import recording_streams
 from semgrid_eval.sources.town.rig import Rig
 from semgrid_eval.sources.town.sensors import Camera, RayCaster, View, look
@@ -124,7 +125,7 @@ class RecordingPlan:
         del values["town"]
         if self.drawn is None:  # so that logs that do not vary stay what they are
             del values["drawn"]
-        if self.drive.frames == drives.FRAME_COUNT:  # likewise
+        if self.drive.frames == FRAME_COUNT:  # likewise
             del values["drive"]["frames"]
         return {**values, "seed": list(self.seed)}
 

@@ -5,7 +5,8 @@ import pytest
 from support.traffic import steady_traffic
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.sources.town.drives import FRAME_COUNT, FRAME_RATE_HZ, choose_drives, ego_path
+from semgrid_eval.sources.town.config import FRAME_COUNT
+from semgrid_eval.sources.town.drives import FRAME_RATE_HZ, choose_drives, ego_path
 from semgrid_eval.sources.town.traffic import type_index
 
 CAR, BUS, PERSON = type_index("car_family"), type_index("bus"), type_index("person")

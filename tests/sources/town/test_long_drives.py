@@ -18,8 +18,8 @@ from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sources.town import rendering
+from semgrid_eval.sources.town.config import SyntheticConfig
 from semgrid_eval.sources.town.drives import FRAME_RATE_HZ, ego_path
-from semgrid_eval.sources.town.recordings import SyntheticConfig
 from semgrid_eval.sources.town.rendering import render_recording
 from semgrid_eval.sources.town.sensors import Camera, cityscapes_camera
 from semgrid_eval.sources.town.shading import draw_sunlight

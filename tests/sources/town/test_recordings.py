@@ -15,7 +15,8 @@ from semgrid_eval.classes import CITYSCAPES_LABELS, LABEL_ID
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, InputError, MissingExtraError
 from semgrid_eval.progress import silent
-from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
+from semgrid_eval.sources.town.config import SyntheticConfig
+from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import render_recording
 from semgrid_eval.sources.town.town import FIRST_PARKED_ID, TownSpec, prepare_town
 

@@ -15,9 +15,10 @@ from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import read_recording, write_log
 from semgrid_eval.progress import silent
 from semgrid_eval.recording.types import Pose, Quantity
+from semgrid_eval.sources.town.config import SyntheticConfig
 from semgrid_eval.sources.town.drives import Drive
 from semgrid_eval.sources.town.noise import DisparityNoise, LabelNoise
-from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
+from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import RecordingPlan, in_sight, render_recording
 from semgrid_eval.sources.town.traffic import Snapshot
 from semgrid_eval.sources.town.varied import RANGES, Range, draw_conditions, fixed_conditions

@@ -1,0 +1,57 @@
+"""Groups of commands that are listed and completed from a table, so that a command is imported only to be used."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from semgrid_eval.errors import did_you_mean
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
+Table = Callable[[], Mapping[str, str]]
+
+
+class TableGroup(click.Group):
+    """A group whose `table` has a line of `--help` for each command, by name; `load` imports one of them."""
+
+    def __init__(
+        self,
+        *given: Any,  # noqa: ANN401 - of any group
+        table: Table,
+        load: Callable[[str], click.Command],
+        **options: Any,  # noqa: ANN401 - of any group
+    ) -> None:
+        super().__init__(*given, **options)
+        self._table, self._load = table, load
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names in the order of the table."""
+        return list(self._table())
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command, or return None where there is none of this name."""
+        return self._load(cmd_name) if cmd_name in self._table() else None
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command that the first word names; one that does not exist is told which was meant."""
+        name = args[0]
+        if name not in self._table() and not ctx.resilient_parsing:
+            ctx.fail(f"No such command {name!r}{did_you_mean(name, self._table()) or '.'}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the table as the section of commands."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(self._table().items()))
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> "list[CompletionItem]":
+        """Complete the name of a command, or an option of the group."""
+        from click.shell_completion import CompletionItem
+
+        named = [(name, text) for name, text in self._table().items() if name.startswith(incomplete)]
+        options = click.Command.shell_complete(self, ctx, incomplete)
+        return [CompletionItem(name, help=text) for name, text in named] + options
