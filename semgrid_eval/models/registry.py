@@ -127,6 +127,11 @@ def is_named(name: str) -> bool:
     return name in MODELS or ":" in name or name in installed_models()
 
 
+def model_names() -> list[str]:
+    """List the names of all built-in and installed models."""
+    return list(dict.fromkeys([*MODELS, *installed_models()]))
+
+
 def installed_models() -> dict[str, str]:
     """List the models that packages have registered: name -> package and version."""
     found = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)

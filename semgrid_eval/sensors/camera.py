@@ -44,9 +44,10 @@ class CameraSensor(SensorConfig):
             raise ValueError(f"image_size_px {width} x {height} is outside {least} to {most}")
         top, bottom, left, right = self.crop_px
         if bottom <= top or right <= left:
-            raise ValueError("it covers no pixel")
+            raise ValueError(f"rows {top} to {bottom} and columns {left} to {right} cover no pixel")
         if bottom > height or right > width:
-            raise ValueError(f"it reaches beyond the image of {width} x {height} px")
+            place = f"rows {top} to {bottom} and columns {left} to {right} reach"
+            raise ValueError(f"{place} beyond the image of {width} x {height} px")
         return self
 
     @property

@@ -199,7 +199,7 @@ def test_a_declared_file_that_is_missing_is_named_and_another_is_another_version
 def test_file_that_is_missing_or_no_python_is_named(tmp_path):
     broken = tmp_path / "broken.py"
     broken.write_text("def half(")
-    with pytest.raises(InputError, match=r"none\.py: is not a Python file"):
+    with pytest.raises(InputError, match=r"none\.py: is not there"):
         find_model(f"{tmp_path / 'none.py'}:Model")
     with pytest.raises(InputError, match=r"broken\.py: raised SyntaxError"):
         find_model(f"{broken}:Model")

@@ -118,7 +118,7 @@ def test_a_row_that_fails_is_noted_and_the_others_go_on(logs, tmp_path):
     reasons = {row.name: row.failure for row in record.rows}
     assert "9" in reasons["ED-far"]
     assert reasons["BL-none"] == "no recording of split 'test' gave grids (splits found: train, val)"
-    assert re.search(r"missing\.py: is not a Python file", reasons["own"])
+    assert re.search(r"missing\.py: is not there", reasons["own"])
     assert reasons["BL-DC"] is None
     assert results.read_run(tmp_path / "run") == record
 

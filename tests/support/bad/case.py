@@ -1,0 +1,114 @@
+"""A bad input, and what becomes of the command that reads it."""
+
+import io
+import os
+import re
+import shlex
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from semgrid_eval.cli.main import main
+from semgrid_eval.errors import SemgridError
+from semgrid_eval.files import digest_files
+
+_NOT_ERRORS = r"Usage: |Try 'semgrid-eval|Warning: |\w[\w ]*: \d+/\d+|\S+: \d+ written|\d+ logs checked|\d+ recordings in|$"
+
+
+def nothing() -> None:
+    """Spoil nothing: the command itself is at fault."""
+
+
+@dataclass(frozen=True)
+class Bad:
+    """A command that is given something bad; it runs in a folder with good files, of which `spoil` changes some."""
+
+    words: str  # for the page, different in each kind
+    command: str
+    spoil: Callable[[], object] = nothing
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Bad inputs of one kind; `whole` writes what is good into the working folder."""
+
+    title: str
+    about: str  # what the page says of all of them
+    whole: Callable[[], object]
+    inputs: tuple[Bad, ...]
+    shows_code: bool = False  # whether `words` are what a file holds or a command says
+
+
+class Outcome(NamedTuple):
+    """What a command left."""
+
+    code: int
+    errors: list[str]  # without `Error: `
+    other: list[str]  # lines that a user sees and that are neither errors, nor usage, nor progress
+    changed: list[str]  # files that were there before and are not the same now
+    partial: list[str]  # files that are not finished
+
+
+def outcome(kind: Kind, bad: Bad) -> Outcome:
+    """Run a command beside whole files of its kind, spoiled."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder).resolve() / "here"
+        shutil.copytree(whole_files(kind.whole), place, symlinks=True)
+        with chdir(place):
+            bad.spoil()
+            before = _digests()
+            code, told = run(bad.command)
+            after = _digests()
+    changed = [name for name, digest in before.items() if after.get(name) != digest]
+    partial = [name for name in after if name.endswith(".part")]
+    errors = [line.removeprefix("Error: ") for line in told if line.startswith("Error: ")]
+    other = [line for line in told if not re.match(f"Error: |{_NOT_ERRORS}", line)]
+    return Outcome(code, errors, other, changed, partial)
+
+
+def run(command: str) -> tuple[int, list[str]]:
+    """Run a command of `semgrid-eval` in this process: its exit code, and the lines on stderr."""
+    err, code = io.StringIO(), 0
+    with redirect_stdout(io.StringIO()), redirect_stderr(err):
+        try:
+            main(shlex.split(command))
+        except SystemExit as left:
+            code = int(left.code or 0)
+    return code, err.getvalue().splitlines()
+
+
+@cache
+def whole_files(write: Callable[[], object]) -> Path:
+    """Return a folder with the good files that a kind begins with, written once."""
+    folder = Path(tempfile.mkdtemp(prefix="semgrid-whole-"))
+    with chdir(folder):
+        write()
+    return folder
+
+
+def remove_whole_files() -> None:
+    """Remove all of these folders."""
+    for folder in _made:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _digests() -> dict[str, str]:
+    return {str(path): _digest(path) for path in sorted(Path().rglob("*"))}
+
+
+def _digest(path: Path) -> str:
+    try:
+        return digest_files([path]) if path.is_file() else ""
+    except SemgridError:  # nobody may read it
+        return str(os.lstat(path).st_size)
+
+
+def table(command: str, write: Callable[[str], object], texts: str | Mapping[str, str]) -> tuple[Bad, ...]:
+    """Make a bad input of each text, or of each line; `write` puts it where the command finds it."""
+    named = texts if isinstance(texts, Mapping) else {line: line for line in texts.strip().splitlines()}
+    return tuple(Bad(words, command, lambda text=text: write(text)) for words, text in named.items())

@@ -1,0 +1,5 @@
+"""All kinds of bad inputs."""
+
+from support.bad import matrices
+
+KINDS = (matrices.MATRIX, matrices.ROW, matrices.STREAM)
