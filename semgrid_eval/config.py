@@ -10,7 +10,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from semgrid_eval.errors import ConfigError, InputError
-from semgrid_eval.faults import in_words, not_one_of, unknown_key
+from semgrid_eval.faults import in_words, not_one_of, unknown_key, unreadable
 from semgrid_eval.files import read_bytes
 
 _YAML_LIMIT_BYTES = 1 << 20
@@ -148,11 +148,8 @@ def load_yaml(path: Path) -> Any:  # noqa: ANN401 - anything that YAML can hold
         raise ConfigError(str(error).removeprefix(f"{path}: "), path=path) from error
     try:
         return yaml.load(content.decode(), Loader=_StrictLoader)
-    except yaml.MarkedYAMLError as error:
-        place = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
-        raise ConfigError(f"is not valid YAML: {place}{error.problem}", path=path) from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: not UTF-8, or a number of 5,000 digits
-        raise ConfigError(f"is not valid YAML: {error}", path=path) from error
+        raise ConfigError(f"is not valid YAML: {unreadable(error)}", path=path) from error
 
 
 def _first_fault(model: type[BaseModel], error: ValidationError, path: Path | str | None) -> ConfigError:

@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import yaml
+
 _SHOWN = 60
-_OWN = "Value error, "
 _NEEDED = {
     "greater_than_equal": "at least {ge}",
     "greater_than": "above {gt}",
@@ -38,6 +39,13 @@ _LENGTHS = {
     "string_too_short": ("at least {min_length}", "characters"),
     "string_too_long": ("at most {max_length}", "characters"),
 }
+_PARTS = {
+    "stream end": "the end of the file",
+    "block end": "the end of this block",
+    "block mapping start": "another one, of other indentation",
+    "scalar": "a second value",
+}
+"""What PyYAML's words mean to who has written a file."""
 _CHOICES = ("literal_error", "enum")
 
 
@@ -67,6 +75,22 @@ def shown(value: object) -> str:
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
 
 
+def unreadable(error: Exception) -> str:
+    """Say what of a text is neither YAML nor JSON, and in which line."""
+    if isinstance(error, UnicodeDecodeError):
+        return f"the byte 0x{error.object[error.start]:02x} at place {error.start} is not UTF-8"
+    if isinstance(error, RecursionError):
+        return "it is nested too deeply"
+    if isinstance(error, json.JSONDecodeError):
+        return f"line {error.lineno}, column {error.colno}: {error.msg[0].lower()}{error.msg[1:]}"
+    if isinstance(error, yaml.reader.ReaderError):
+        return f"the character {chr(error.character)!a} at place {error.position} is not allowed"
+    if isinstance(error, yaml.MarkedYAMLError):
+        line = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
+        return line + re.sub(r"'?<([a-z ]+)>'?", lambda found: _PARTS.get(found[1], found[1]), str(error.problem))
+    return "a number has too many digits" if "integer string" in str(error) else str(error)
+
+
 def in_words(fault: Mapping[str, Any]) -> str:
     """Put what pydantic says of a value into words: what it has to be, and what it is."""
     kind, found = fault["type"], fault.get("input")
@@ -81,6 +105,6 @@ def in_words(fault: Mapping[str, Any]) -> str:
         limit, things = _LENGTHS[kind]
         size = len(found) if hasattr(found, "__len__") else context.get("actual_length")
         return f"must have {limit.format(**context)} {things}, not {size}" if size else "must not be empty"
-    message = str(fault["msg"]).removeprefix(_OWN)
-    told = isinstance(found, dict | list | None) or str(found) in message
-    return message if told else f"{message} (found {shown(found)})"
+    if kind == "value_error":  # of ours
+        return str(fault["msg"]).removeprefix("Value error, ")
+    return f"{fault['msg']} (found {shown(found)})"

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.faults import unreadable
 from semgrid_eval.places import held_folder, hold, partial_of, put, restore
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ def read_json(path: Path, *, limit: int = JSON_LIMIT_BYTES) -> Any:  # noqa: ANN
     try:
         return json.loads(content)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"is not valid JSON: {error}", path=path) from error
+        raise InputError(f"is not valid JSON: {unreadable(error)}", path=path) from error
 
 
 def open_regular(path: Path, *, limit: int = READ_LIMIT_BYTES) -> BinaryIO:
@@ -164,7 +165,7 @@ def open_regular(path: Path, *, limit: int = READ_LIMIT_BYTES) -> BinaryIO:
     if stat.S_ISREG(found.st_mode) and found.st_size <= limit:
         return os.fdopen(descriptor, "rb")
     os.close(descriptor)
-    large = f"has {found.st_size >> 20} MiB, and {limit >> 20} are allowed"
+    large = f"has {found.st_size} bytes, and {limit} are allowed"
     raise InputError(large if stat.S_ISREG(found.st_mode) else "is not a regular file", path=path)
 
 

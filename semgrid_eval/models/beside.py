@@ -38,7 +38,8 @@ def require_python(path: Path) -> None:
     if path.suffix != ".py":
         raise InputError("is not a Python file (.py); a model is given as path.py:Class", path=path)
     if not path.is_file():
-        raise InputError("is not there; a model is given as path.py:Class", path=path)
+        fault = "is not a file" if path.exists() else "is not there"
+        raise InputError(f"{fault}; a model is given as path.py:Class", path=path)
 
 
 class ModelFile:

@@ -76,7 +76,10 @@ def _require_model(name: str) -> None:
     """Refuse a model of a command line that cannot be there; one of a file is a row that fails when its turn comes."""
     try:
         if ":" in name:
-            require_python(Path(name.rpartition(":")[0]))
+            file, _, cls = name.rpartition(":")
+            require_python(Path(file))
+            if not cls.isidentifier():
+                raise ConfigError(f"{cls!r} is not the name of a class; a model is given as path.py:Class", path=file)
         elif name not in (known := model_names()):
             raise ConfigError(f"{not_one_of(name, [*known, 'path.py:Class'])}")
     except InputError as error:
@@ -104,7 +107,8 @@ def _load(name: str, *above: Path) -> tuple[Path, object]:
             return Path(f"preset {name}"), load_yaml(place)
     path = above[-1].parent / name if above else Path(name)
     if path.is_file():
-        return path, load_yaml(path)
+        value = load_yaml(path)
+        return path, {} if value is None else value
     presets = preset_names()
     fault = f"is neither a file nor a preset ({', '.join(presets)}){meant(name, presets)}"
     if above:
@@ -187,7 +191,9 @@ def _with_bases(row: dict[str, Any], models: dict[str, dict[str, Any]]) -> dict[
 def _combinations(axes: _Axes, place: str) -> Iterator[dict[str, Any]]:
     lengths = {len(values) for values in axes.zip.values()}
     if len(lengths) > 1:
-        raise ConfigError(f"lists must be equally long, and have {shown(sorted(lengths))} values", path=place, field="axes.zip")
+        raise ConfigError(
+            f"lists must be equally long, and have {shown(sorted(lengths))} values", path=place, field="axes.zip"
+        )
     together = [dict(zip(axes.zip, values, strict=True)) for values in zip(*axes.zip.values(), strict=True)] or [{}]
     for values in itertools.product(*axes.grid.values()):
         for zipped in together:

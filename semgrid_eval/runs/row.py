@@ -80,7 +80,9 @@ class Row(Config):
         if not is_named(self.model):
             raise ValueError(f"model: {not_one_of(self.model, [*model_names(), 'path.py:Class'])}")
         if self.scored_window.inputs != self.window.inputs:
-            raise ValueError(f"validation_window.inputs: has {self.scored_window.inputs} inputs, window {self.window.inputs}")
+            raise ValueError(
+                f"validation_window.inputs: has {self.scored_window.inputs} inputs, window {self.window.inputs}"
+            )
         self._check_leads()
         self._check_disturb()
         self._check_stream()
@@ -92,7 +94,9 @@ class Row(Config):
         if self.train_leads is None:
             return
         if not 1 <= self.train_leads[0] <= self.train_leads[1]:
-            raise ValueError(f"train_leads: {list(self.train_leads)} is not a first and a last number of frames, from 1")
+            raise ValueError(
+                f"train_leads: {list(self.train_leads)} is not a first and a last number of frames, from 1"
+            )
         reach, target = self.window.span_frames + self.train_leads[1], self.window.target_frame
         if target is not None and reach > target:
             raise ValueError(f"train_leads: reach back {reach} frames, and target_frame is {target}")

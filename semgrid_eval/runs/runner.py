@@ -14,7 +14,7 @@ from semgrid_eval.errors import ConfigError, SemgridError, first_line
 from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import Question
-from semgrid_eval.models.device import choose_device, is_out_of_memory, settle_process
+from semgrid_eval.models.device import choose_device, is_out_of_memory, memory_words, settle_process
 from semgrid_eval.models.registry import MODELS, adopt, ways_of_own_models
 from semgrid_eval.places import remove_stale
 from semgrid_eval.progress import Progress, Stage, silent, silent_stage
@@ -211,7 +211,7 @@ def failure_of(error: Exception, row: Row) -> str | None:
     if isinstance(error, SemgridError):
         return str(error)
     if is_out_of_memory(error):
-        return f"out of memory: {first_line(error)}"
+        return memory_words(error)
     # What torch and its libraries raise, or code of one's own that they call.
     if isinstance(error, RuntimeError) or row.model not in MODELS:
         return f"{type(error).__name__}: {first_line(error)}"

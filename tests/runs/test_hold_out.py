@@ -50,7 +50,7 @@ def test_a_group_that_no_recording_has_fails_the_row_alone(logs, tmp_path):
     rows = [{"name": "wrong", "model": "newest", "hold_out": ["d"]}, {"name": "BL", "model": "newest"}]
     wrong, right = run(rows, logs, tmp_path / "run").rows
     assert wrong.failure is not None
-    assert "no recording of split 'train' is of the group 'd', only a, b" in wrong.failure
+    assert "no recording of split 'train' is of the group 'd' (groups found: a, b)" in wrong.failure
     assert right.failure is None
 
 

@@ -1,5 +1,6 @@
 """A bad input, and what becomes of the command that reads it."""
 
+import atexit
 import io
 import os
 import re
@@ -8,7 +9,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import chdir, redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -17,7 +18,9 @@ from semgrid_eval.cli.main import main
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.files import digest_files
 
-_NOT_ERRORS = r"Usage: |Try 'semgrid-eval|Warning: |\w[\w ]*: \d+/\d+|\S+: \d+ written|\d+ logs checked|\d+ recordings in|$"
+_NOT_ERRORS = (
+    r"Usage: |Try 'semgrid-eval|Warning: |\w[\w ]*: \d+/\d+|\S+: \d+ written|\d+ logs checked|\d+ recordings in|$"
+)
 
 
 def nothing() -> None:
@@ -26,11 +29,12 @@ def nothing() -> None:
 
 @dataclass(frozen=True)
 class Bad:
-    """A command that is given something bad; it runs in a folder with good files, of which `spoil` changes some."""
+    """A command that is given something bad, in a folder with good files."""
 
     words: str  # for the page, different in each kind
     command: str
-    spoil: Callable[[], object] = nothing
+    files: Mapping[str, bytes] = field(default_factory=dict)  # bad ones, put over the good
+    spoil: Callable[[], object] = nothing  # what else is done to the folder
 
 
 @dataclass(frozen=True)
@@ -60,9 +64,13 @@ def outcome(kind: Kind, bad: Bad) -> Outcome:
         place = Path(folder).resolve() / "here"
         shutil.copytree(whole_files(kind.whole), place, symlinks=True)
         with chdir(place):
+            for name, content in bad.files.items():
+                Path(name).parent.mkdir(parents=True, exist_ok=True)
+                Path(name).write_bytes(content)
             bad.spoil()
             before = _digests()
             code, told = run(bad.command)
+            told = [line.replace(f"{place}/", "").replace(str(place), ".") for line in told]
             after = _digests()
     changed = [name for name, digest in before.items() if after.get(name) != digest]
     partial = [name for name in after if name.endswith(".part")]
@@ -84,17 +92,12 @@ def run(command: str) -> tuple[int, list[str]]:
 
 @cache
 def whole_files(write: Callable[[], object]) -> Path:
-    """Return a folder with the good files that a kind begins with, written once."""
+    """Return a folder with the good files that a kind begins with, written once and removed when Python ends."""
     folder = Path(tempfile.mkdtemp(prefix="semgrid-whole-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     with chdir(folder):
         write()
     return folder
-
-
-def remove_whole_files() -> None:
-    """Remove all of these folders."""
-    for folder in _made:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _digests() -> dict[str, str]:
@@ -108,7 +111,11 @@ def _digest(path: Path) -> str:
         return str(os.lstat(path).st_size)
 
 
-def table(command: str, write: Callable[[str], object], texts: str | Mapping[str, str]) -> tuple[Bad, ...]:
-    """Make a bad input of each text, or of each line; `write` puts it where the command finds it."""
-    named = texts if isinstance(texts, Mapping) else {line: line for line in texts.strip().splitlines()}
-    return tuple(Bad(words, command, lambda text=text: write(text)) for words, text in named.items())
+def table(command: str, name: str, contents: Mapping[str, bytes]) -> tuple[Bad, ...]:
+    """Make a bad input of each content of the file `name`, by what the page says of it."""
+    return tuple(Bad(words, command, {name: content}) for words, content in contents.items())
+
+
+def lines(text: str) -> list[str]:
+    """Return the lines of a table."""
+    return text.strip().splitlines()

@@ -1,5 +1,10 @@
 """All kinds of bad inputs."""
 
-from support.bad import matrices
+from support.bad import cityscapes, contracts, latencies, matrices, on_logs, own_models, predictions, yaml_files
 
-KINDS = (matrices.MATRIX, matrices.ROW, matrices.STREAM)
+KINDS = (
+    *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, matrices.STREAM, on_logs.KIND),
+    *latencies.KINDS,
+    *(own_models.MODEL, predictions.KIND, contracts.CONTRACT),
+    *cityscapes.KINDS,
+)

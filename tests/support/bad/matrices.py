@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from support.bad.case import Bad, Kind, table
+from support.bad.case import Kind, lines, table
 
 RUN = "run bad.yaml --logs logs --out out"
 _LOGS = Path("logs/val/empty.mcap")
@@ -263,41 +263,32 @@ model: residual-town, stream: {latency_ms: 80, asked: fixed}, window: {lead_ms: 
 """
 
 
-def _file(text: str) -> None:
-    Path("bad.yaml").write_bytes(file_text(text))
-
-
-def _row(text: str) -> None:
-    Path("bad.yaml").write_bytes(row_text(text))
-
-
-def _stream(text: str) -> None:
-    _row(f"model: newest, stream: {text}")
-
-
-def changed(name: str) -> Bad:
-    """Ask for a preset by a name that is none."""
-    return Bad(f"run {name} --logs logs --out out", f"run {name} --logs logs --out out")
-
+FILE_BYTES = {line: file_text(line) for line in lines(FILES)} | {
+    words: text.encode() for words, text in LONG_FILES.items()
+}
+ROW_BYTES = {line: row_text(line) for line in lines(ROWS)}
+STREAM_BYTES = {line: row_text(f"model: newest, stream: {line}") for line in lines(STREAMS)} | {
+    line: row_text(line) for line in lines(STREAM_ROWS)
+}
 
 MATRIX = Kind(
     "Matrices",
     "The whole of a matrix file, `bad.yaml`; `\\n` stands for a new line.",
     whole,
-    (*table(RUN, _file, FILES), *table(RUN, lambda text: Path("bad.yaml").write_text(text), LONG_FILES)),
+    table(RUN, "bad.yaml", FILE_BYTES),
     shows_code=True,
 )
 ROW = Kind(
     "Rows of a matrix",
     "A matrix `bad.yaml` with one row, `name: a` and what the table says.",
     whole,
-    table(RUN, _row, ROWS),
+    table(RUN, "bad.yaml", ROW_BYTES),
     shows_code=True,
 )
 STREAM = Kind(
     "Streams",
-    "What `stream:` of a row is, in a matrix `bad.yaml` with one row.",
+    "What `stream:` of a row is, or the row, in a matrix `bad.yaml` with one row.",
     whole,
-    (*table(RUN, _stream, STREAMS), *table(RUN, _row, STREAM_ROWS)),
+    table(RUN, "bad.yaml", STREAM_BYTES),
     shows_code=True,
 )
