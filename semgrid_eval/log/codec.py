@@ -37,6 +37,7 @@ FORMAT_VERSION = 1
 _NS_PER_S = 1_000_000_000
 _MAX_STAMP_NS = 1 << 63
 _MAX_NAME_BYTES = 200
+_WORDS, _LISTS = ("name", "dataset", "split", "source_digest"), ("cameras", "class_names")  # of a scene
 _SHOWN = 40
 _GPS_FIELDS = ("latitude_deg", "longitude_deg", "heading_deg")
 _INTRINSICS = ("fx_px", "fy_px", "u0_px", "v0_px")
@@ -82,11 +83,22 @@ class Scene:
             raise ValueError(f"metadata {RECORD} does not match its digest")
         if given.get("format_version") != str(FORMAT_VERSION):
             raise ValueError(f"its format version is {given.get('format_version')}; {FORMAT_VERSION} can be read")
+        if missing := [name for name in (*_WORDS, *_LISTS) if name not in given]:
+            raise ValueError(f"metadata {RECORD} does not say its {missing[0]}")
         for key in ("name", "split"):
             require_file_name(given[key], key)
-        words = {name: given[name] for name in ("name", "dataset", "split", "source_digest")}
-        cameras, class_names = (tuple(json.loads(given[name])) for name in ("cameras", "class_names"))
-        return cls(**words, cameras=cameras, class_names=class_names, group=given.get("group", ""))
+        lists = {name: _names(given[name], name) for name in _LISTS}
+        return cls(**{name: given[name] for name in _WORDS}, **lists, group=given.get("group", ""))
+
+
+def _names(text: str, what: str) -> tuple[str, ...]:
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, list) or not all(isinstance(each, str) for each in found):
+        raise ValueError(f"its {what} {text[:_SHOWN]!r} are not a list of names")
+    return tuple(found)
 
 
 def is_scene_whole(entries: Mapping[str, str]) -> bool:

@@ -18,6 +18,7 @@ from semgrid_eval.cli.main import main
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.files import digest_files
 
+_DIGEST = re.compile(r"\b[0-9a-f]{16}\b")  # of what versions of packages are part of, too
 _NOT_ERRORS = (
     r"Usage: |Try 'semgrid-eval|Warning: |\w[\w ]*: \d+/\d+|\S+: \d+ written|\d+ logs checked|\d+ recordings in|$"
 )
@@ -70,7 +71,7 @@ def outcome(kind: Kind, bad: Bad) -> Outcome:
             bad.spoil()
             before = _digests()
             code, told = run(bad.command)
-            told = [line.replace(f"{place}/", "").replace(str(place), ".") for line in told]
+            told = [_DIGEST.sub("(digest)", line.replace(f"{place}/", "").replace(str(place), ".")) for line in told]
             after = _digests()
     changed = [name for name, digest in before.items() if after.get(name) != digest]
     partial = [name for name in after if name.endswith(".part")]
@@ -80,14 +81,16 @@ def outcome(kind: Kind, bad: Bad) -> Outcome:
 
 
 def run(command: str) -> tuple[int, list[str]]:
-    """Run a command of `semgrid-eval` in this process: its exit code, and the lines on stderr."""
+    """Run a command of `semgrid-eval` in this process: its exit code, the first error that a check found, and the lines on stderr."""
     err, code = io.StringIO(), 0
-    with redirect_stdout(io.StringIO()), redirect_stderr(err):
+    out = io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
         try:
             main(shlex.split(command))
         except SystemExit as left:
             code = int(left.code or 0)
-    return code, err.getvalue().splitlines()
+    findings = [f"Error: {line}" for line in out.getvalue().splitlines() if ": error: " in line]
+    return code, [*findings[:1], *err.getvalue().splitlines()]
 
 
 @cache
