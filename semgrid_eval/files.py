@@ -209,5 +209,7 @@ def digest_files(paths: Iterable[Path], *, limit: int = READ_LIMIT_BYTES) -> str
 
 
 def _reason(error: OSError) -> str:
+    if isinstance(error, FileExistsError) and error.filename is not None:
+        return f"{os.fsdecode(error.filename)} is there and is not a folder"
     # numpy has no error number for arrays that were written in part.
     return error.strerror or f"{error} (no space left?)"

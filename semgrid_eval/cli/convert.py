@@ -8,6 +8,7 @@ import click
 
 from semgrid_eval.cli.console import progress, say
 from semgrid_eval.cli.options import FOLDER, chosen_executor, executor_options, parameters_of, workers_option
+from semgrid_eval.cli.types import HintingGroup
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import InputError, MissingExtraError
 from semgrid_eval.sources.known import SOURCES, Source, load_source
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from semgrid_eval.log.convert import ConversionSummary
 
 
-class _Sources(click.Group):
+class _Sources(HintingGroup):
     """Imports a source only when its command is asked for."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from semgrid_eval import __version__
+from semgrid_eval.cli.types import HintingGroup
 from semgrid_eval.errors import SemgridError, printable
 
 _COMMANDS = ("convert", "check", "segment", "grids", "run", "report", "play", "demo", "bench", "latency")
@@ -21,7 +22,7 @@ _GO_ON = ("convert", "segment", "grids", "run", "demo")
 """Commands that keep what is done, so that after a stop they need not begin again."""
 
 
-class _LazyGroup(click.Group):
+class _LazyGroup(HintingGroup):
     """Imports a command only when it is asked for, so that `--help` and `check` do not wait for torch."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:

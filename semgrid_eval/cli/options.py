@@ -9,13 +9,14 @@ import click
 from pydantic.fields import FieldInfo
 
 from semgrid_eval.apart import Limits
+from semgrid_eval.cli.types import Number, Whole
 from semgrid_eval.config import Config
 from semgrid_eval.executors import Executor, available_cores, local_executor
 from semgrid_eval.ray_executor import LOCAL, RayExecutor
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
 THERE = click.Path(path_type=Path, exists=True)
-WORKERS = click.IntRange(1, 256)
+WORKERS = Whole(1, 256)
 Command = TypeVar("Command", bound=Callable[..., Any])
 device_option = click.option("--device", default="auto", show_default=True, help="auto, cpu, cuda or cuda:N.")
 
@@ -86,14 +87,14 @@ def own_model_options(command: Command) -> Command:
     )
     time = click.option(
         "--time-limit",
-        type=click.FloatRange(0, min_open=True),
+        type=Number(0, min_open=True),
         default=Limits.time_s,
         show_default=True,
         help="Seconds in which code of your own, apart, has to give a sign: an update, a batch, the end of its `fit`.",
     )
     memory = click.option(
         "--memory-limit",
-        type=click.FloatRange(0, min_open=True),
+        type=Number(0, min_open=True),
         show_default="7/8 of the machine's",
         help="GiB that code of your own, apart, may use.",
     )

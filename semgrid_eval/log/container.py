@@ -21,7 +21,6 @@ from semgrid_eval.log.records import (
     MAGIC,
     MAX_CHUNK_BYTES,
     data_crc,
-    exactly,
     read_at,
     read_attachment,
     read_chunk,

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from importlib import resources
@@ -106,7 +107,7 @@ def _load(name: str, *above: Path) -> tuple[Path, object]:
         with resources.as_file(resources.files("semgrid_eval.presets") / f"{name}.yaml") as place:
             return Path(f"preset {name}"), load_yaml(place)
     path = above[-1].parent / name if above else Path(name)
-    if path.is_file():
+    if os.path.lexists(path):  # what is no file is refused as such
         value = load_yaml(path)
         return path, {} if value is None else value
     presets = preset_names()

@@ -12,6 +12,7 @@ import torch
 from semgrid_eval.apart import Limits
 from semgrid_eval.errors import ConfigError, SemgridError, first_line
 from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
+from semgrid_eval.faults import not_one_of
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import Question
 from semgrid_eval.models.device import choose_device, is_out_of_memory, memory_words, settle_process
@@ -127,8 +128,7 @@ def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:
     found = {each: [row for row in matrix.rows if row.name == each or fnmatchcase(row.name, each)] for each in only}
     for pattern, rows in found.items():
         if not rows:
-            names = ", ".join(sorted(row.name for row in matrix.rows))
-            raise ConfigError(f"{pattern!r} is not a row of this matrix: {names}", field="row")
+            raise ConfigError(not_one_of(pattern, sorted(row.name for row in matrix.rows)), field="row")
     return [row for row in matrix.rows if not only or any(row in rows for rows in found.values())]
 
 

@@ -141,7 +141,7 @@ def test_installed_entry_point_is_a_model(monkeypatch, batch):
     assert torch.equal(model.predict(batch).argmax(dim=1), batch.past[:, 0, -1].long())
     assert is_named("mine")
     assert version_of("mine") != version_of("newest")
-    with pytest.raises(InputError, match=r"no model 'yours' is installed \(mine found\)"):
+    with pytest.raises(InputError, match=r"model: 'yours' is not one of .*, mine, path.py:Class"):
         find_model("yours")
 
 

@@ -282,5 +282,5 @@ def test_one_row_alone_can_be_run_and_the_others_keep_what_they_have(logs, tmp_p
     assert second.rows[0].results == first.rows[0].results
     third = run(rows, logs, tmp_path / "third", only=("BL-*", "BL-DC"))
     assert [row.failure for row in third.rows] == [None, None, "not run yet"]
-    with pytest.raises(ConfigError, match=r"row: 'BL-Fus' is not a row of this matrix: BL-DC, BL-Fuse, ED"):
+    with pytest.raises(ConfigError, match=r"row: 'BL-Fus' is not one of BL-DC, BL-Fuse, ED; did you mean BL-Fuse"):
         run(rows, logs, out, only=("BL-Fus",))

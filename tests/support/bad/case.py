@@ -18,10 +18,10 @@ from semgrid_eval.cli.main import main
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.files import digest_files
 
-_DIGEST = re.compile(r"\b[0-9a-f]{16}\b")  # of what versions of packages are part of, too
-_NOT_ERRORS = (
-    r"Usage: |Try 'semgrid-eval|Warning: |\w[\w ]*: \d+/\d+|\S+: \d+ written|\d+ logs checked|\d+ recordings in|$"
-)
+_DIGEST = re.compile(r"\b(?=[0-9]*[a-f])[0-9a-f]{16}\b")  # of what versions of packages are part of, too
+_FINDING = ": error: |: not recovered: "  # of `check`, on stdout
+_PROGRESS = r"\w[\w ]*: \d+/\d+|\S+: \d+ written|\d+ logs (checked|saved)|\d+ recordings in|$"
+_NOT_ERRORS = rf"Usage: |Try 'semgrid-eval|Warning: |{_PROGRESS}"
 
 
 def nothing() -> None:
@@ -81,7 +81,10 @@ def outcome(kind: Kind, bad: Bad) -> Outcome:
 
 
 def run(command: str) -> tuple[int, list[str]]:
-    """Run a command of `semgrid-eval` in this process: its exit code, the first error that a check found, and the lines on stderr."""
+    """Run a command of `semgrid-eval` in this process.
+
+    Returns its exit code, and the lines on stderr after the first error that a check found.
+    """
     err, code = io.StringIO(), 0
     out = io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):
@@ -89,7 +92,7 @@ def run(command: str) -> tuple[int, list[str]]:
             main(shlex.split(command))
         except SystemExit as left:
             code = int(left.code or 0)
-    findings = [f"Error: {line}" for line in out.getvalue().splitlines() if ": error: " in line]
+    findings = [f"Error: {line}" for line in out.getvalue().splitlines() if re.search(_FINDING, line)]
     return code, [*findings[:1], *err.getvalue().splitlines()]
 
 

@@ -40,7 +40,6 @@ run baselines --logs logs --out out --memory-limit 0
 run baselines --logs logs --out out --gpus -1
 run baselines --logs logs --out out --dry-runn
 run baselines more --logs logs --out out
-convert
 convert kitti SRC out
 convert cityscapse SRC out
 convert cityscapes nowhere out
@@ -53,15 +52,15 @@ convert cityscapes empty out --workers 0
 convert synthetic
 convert synthetic out --recordings 0
 convert synthetic out --recordings many
-convert synthetic out --seed -1
-convert synthetic out --seed 18446744073709551616
-convert synthetic out --towns 0
-convert synthetic out --towns 1
-convert synthetic out --val-share 1.5
-convert synthetic out --frames 1
-convert synthetic out --duration-s 1
-convert synthetic out --errors none
-convert synthetic out --split test
+convert synthetic out --recordings 2 --seed -1
+convert synthetic out --recordings 2 --seed 18446744073709551616
+convert synthetic out --recordings 2 --towns 0
+convert synthetic out --recordings 2 --towns 1
+convert synthetic out --recordings 2 --val-share 1.5
+convert synthetic out --recordings 2 --frames 1
+convert synthetic out --recordings 2 --duration-s 1
+convert synthetic out --recordings 2 --errors none
+convert synthetic out --recordings 2 --split test
 convert town-v1 out --size medium
 convert town-v1 out --split test
 convert town-v1 out --cache file.txt

@@ -12,6 +12,7 @@ from support.bad import (
     own_models,
     predictions,
     results,
+    surroundings,
     yaml_files,
 )
 
@@ -20,5 +21,5 @@ KINDS = (
     *latencies.KINDS,
     *(own_models.MODEL, predictions.KIND, contracts.CONTRACT),
     *cityscapes.KINDS,
-    *(logs.KIND, networks.KIND, results.KIND, commands.KIND),
+    *(logs.KIND, networks.KIND, results.KIND, commands.KIND, surroundings.KIND),
 )

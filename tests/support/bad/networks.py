@@ -38,7 +38,9 @@ def _tensor(name: str, shape: Iterable[int | str | None], kind: int = TensorProt
     return helper.make_tensor_value_info(name, kind, list(shape))
 
 
-def _net(words: str, nodes: list[NodeProto], *tensors: list[ValueInfoProto], more: str = "", constants: tuple = ()) -> Bad:
+def _net(
+    words: str, nodes: list[NodeProto], *tensors: list[ValueInfoProto], more: str = "", constants: tuple = ()
+) -> Bad:
     return Bad(words, f"{SEGMENT}{more}", spoil=lambda: save(Path("net.onnx"), nodes, *tensors, constants))
 
 
@@ -94,8 +96,8 @@ KIND = Kind(
         _given("--size 0", "--size 0 4"),
         _given("--out in the folder of the logs", "--out logs/new"),
         Bad("a log without colour images", SEGMENT, spoil=lambda: _write(lambda frame: replace(frame, image_png=None))),
-        Bad("two logs of one name", f"segment logs more --model net.onnx --out out", spoil=lambda: (Path("more").mkdir(), Path("more/a.mcap").write_bytes(Path("logs/a.mcap").read_bytes()))),
-        Bad(f"`{LATENCY}`: not ONNX", LATENCY, {"net.onnx": b"weights"}),
-        Bad(f"`{LATENCY}`: 18 classes", LATENCY, spoil=lambda: colour_network(Path("net.onnx"), colours=COLOURS, classes=18)),
+        Bad("two logs of one name", "segment logs more --model net.onnx --out out", spoil=lambda: (Path("more").mkdir(), Path("more/a.mcap").write_bytes(Path("logs/a.mcap").read_bytes()))),
+        Bad("`latency --segment`: not ONNX", LATENCY, {"net.onnx": b"weights"}),
+        Bad("`latency --segment`: 18 classes", LATENCY, spoil=lambda: colour_network(Path("net.onnx"), colours=COLOURS, classes=18)),
     ),
 )  # fmt: skip
