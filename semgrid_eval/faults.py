@@ -103,7 +103,7 @@ def in_words(fault: Mapping[str, Any]) -> str:
         return f"must be {_NEEDED[kind].format(**context)}, not {shown(found)}"
     if kind in _LENGTHS:
         limit, things = _LENGTHS[kind]
-        size = len(found) if hasattr(found, "__len__") else context.get("actual_length")
+        size = len(found) if isinstance(found, str | list | dict) else context.get("actual_length")
         return f"must have {limit.format(**context)} {things}, not {size}" if size else "must not be empty"
     if kind == "value_error":  # of ours
         return str(fault["msg"]).removeprefix("Value error, ")

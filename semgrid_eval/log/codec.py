@@ -87,8 +87,9 @@ class Scene:
             raise ValueError(f"metadata {RECORD} does not say its {missing[0]}")
         for key in ("name", "split"):
             require_file_name(given[key], key)
-        lists = {name: _names(given[name], name) for name in _LISTS}
-        return cls(**{name: given[name] for name in _WORDS}, **lists, group=given.get("group", ""))
+        words: dict[str, Any] = {name: given[name] for name in _WORDS}
+        lists: dict[str, Any] = {name: _names(given[name], name) for name in _LISTS}
+        return cls(**words, **lists, group=given.get("group", ""))
 
 
 def _names(text: str, what: str) -> tuple[str, ...]:
@@ -118,12 +119,22 @@ def read_conditions(entries: Mapping[str, str]) -> dict[str, Quantity]:
     Raises:
         ValueError: one does not begin with a finite number.
     """
-    parts = {name: text.partition(" ") for name, text in entries.items()}
-    found = {name: Quantity(json.loads(value), unit) for name, (value, _, unit) in parts.items()}
-    for name, each in found.items():
-        if type(each.value) not in (int, float) or not math.isfinite(each.value):
+    found = {}
+    for name, text in entries.items():
+        value, _, unit = text.partition(" ")
+        if (number := _number(value)) is None:
             raise ValueError(f"its condition {name[:_SHOWN]!r} is not a number")
+        found[name] = Quantity(number, unit)
     return found
+
+
+def _number(text: str) -> float | None:
+    """Read a finite number as it was written, whole or not; None where there is none."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return found if type(found) in (int, float) and math.isfinite(found) else None
 
 
 def require_file_name(text: str, what: str) -> None:

@@ -93,7 +93,12 @@ PNG_WORDS = {
     "too_large": "more pixels than are allowed",
     "two_headers": "two headers",
 }
-PNG_BYTES = {words: (PNGS / f"{name}.png").read_bytes() for name, words in PNG_WORDS.items()}
+_GOOD = encode_gray(np.zeros((8, 16), np.uint8))
+PNG_BYTES = {words: (PNGS / f"{name}.png").read_bytes() for name, words in PNG_WORDS.items()} | {
+    "a wrong checksum of its header": _GOOD[:29] + b"\0\0\0\0" + _GOOD[33:],
+    "no header": _GOOD[:8] + _GOOD[33:],
+    "only a header": _GOOD[:33],
+}
 
 
 def _picture(*shape: int, kind: type = np.uint8) -> bytes:
@@ -138,12 +143,17 @@ TREES = (
     _tree("labels: two images of a frame", lambda: _two_labels(), LABELLED),
     _tree("labels: named as train ids", lambda: _rename_labels("labelTrainIds"), LABELLED),
     _tree("labels: named as label ids, and --train-ids", lambda: None, f"{LABELLED} --train-ids"),
-    Bad("labels: train ids that are label ids", f"{LABELLED} --train-ids", {str(LABEL): IDS}, lambda: _rename_labels("x")),
+    Bad(
+        "labels: train ids that are label ids",
+        f"{LABELLED} --train-ids",
+        {str(LABEL): IDS},
+        lambda: _rename_labels("x"),
+    ),
     _is("labels: of another size", LABEL, _picture(4, 8), LABELLED),
     _is("labels: of 16 bit", LABEL, _picture(8, 16, kind=np.uint16), LABELLED),
     _is("labels: in colour", LABEL, _picture(8, 16, 3), LABELLED),
     _is("labels: not a picture", LABEL, b"road", LABELLED),
-)  # fmt: skip
+)
 
 
 def _to_folder(path: Path) -> None:

@@ -58,6 +58,14 @@ convert synthetic out --recordings 2 --towns 0
 convert synthetic out --recordings 2 --towns 1
 convert synthetic out --recordings 2 --val-share 1.5
 convert synthetic out --recordings 2 --frames 1
+convert synthetic out --recordings 2 --frames 2000
+convert synthetic out --recordings 2 --val-towns 4
+convert synthetic out --recordings 2 --val-towns 0
+convert synthetic out --recordings 2 --town-size-m 2000 --duration-s 3600
+convert synthetic out --recordings 2 --town-size-m 10
+convert synthetic out --recordings 2 --width 5
+convert synthetic out --recordings 2 --height 5000
+convert synthetic out --recordings 2 --stereo guessed
 convert synthetic out --recordings 2 --duration-s 1
 convert synthetic out --recordings 2 --errors none
 convert synthetic out --recordings 2 --split test

@@ -3,6 +3,7 @@
 from support.bad import (
     cityscapes,
     commands,
+    containers,
     contracts,
     latencies,
     logs,
@@ -21,5 +22,5 @@ KINDS = (
     *latencies.KINDS,
     *(own_models.MODEL, predictions.KIND, contracts.CONTRACT),
     *cityscapes.KINDS,
-    *(logs.KIND, networks.KIND, results.KIND, commands.KIND, surroundings.KIND),
+    *(logs.KIND, containers.KIND, networks.KIND, results.KIND, commands.KIND, surroundings.KIND),
 )

@@ -83,7 +83,11 @@ KINDS = (
         (
             *table(small.RUN, "profile.json", PROFILE_BYTES),
             Bad("no such file", small.RUN, spoil=lambda: Path("profile.json").unlink()),
-            Bad("stream: {profile: profile.json, profile_model: fuse}", small.RUN, spoil=lambda: _rows("profile: profile.json, profile_model: fuse")),
+            Bad(
+                "stream: {profile: profile.json, profile_model: fuse}",
+                small.RUN,
+                spoil=lambda: _rows("profile: profile.json, profile_model: fuse"),
+            ),
         ),
     ),
     Kind(
@@ -98,4 +102,4 @@ KINDS = (
             _lead("model: newest, window: {lead_ms: from logs}"),
         ),
     ),
-)  # fmt: skip
+)

@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
@@ -56,24 +57,28 @@ def whole() -> None:
 Message = Callable[[str, bytes], bytes | None]
 
 
-def _as_it_is(topic: str, data: bytes) -> bytes | None:
+def as_it_is(topic: str, data: bytes) -> bytes | None:
+    """Change no message."""
     return data
 
 
-def _again(message: Message = _as_it_is, scene: dict[str, str] | None = None, **changes: object) -> None:
+def again(message: Message = as_it_is, scene: dict[str, str] | None = None, **changes: object) -> None:
     """Write the log again with checksums that hold: other messages, another record, other times or types."""
     content = LOG.read_bytes()
     reader = make_reader(LOG.open("rb"))
     with LOG.with_suffix(".new").open("wb") as stream:
         writer = Writer(stream, enable_data_crcs=True)
         writer.start(profile="", library="")
-        _copy(reader, writer, message, scene, changes)
+        copy(reader, writer, message, scene, changes)
         writer.finish()
     LOG.with_suffix(".new").rename(LOG)
     assert LOG.read_bytes() != content
 
 
-def _copy(reader: object, writer: Writer, message: Message, scene: dict[str, str] | None, changes: dict) -> None:
+def copy(
+    reader: object, writer: Writer, message: Message, scene: dict[str, str] | None, changes: dict[str, Any]
+) -> None:
+    """Copy a log: messages as `message` changes them, what `scene` puts into records, other types of topics."""
     for record in reader.iter_metadata():
         writer.add_metadata(record.name, _sealed(record.metadata | (scene or {})))
     for each in reader.iter_attachments():
@@ -143,6 +148,7 @@ def _log(words: str, spoil: Callable[[], object], command: str = GRIDS) -> Bad:
     return Bad(words, command, spoil=spoil)
 
 
+LATENCY = "latency logs --out latency.json --frames 1 --warm-up 0 --threads 1 --device cpu"
 SMALL = encode_gray(np.zeros((8, 8), np.uint8))
 SPEED = {"speed_mps": 1e6}
 KIND = Kind(
@@ -153,36 +159,55 @@ KIND = Kind(
         *(Bad(words, GRIDS, {str(LOG): content}) for words, content in FOUND_BYTES.items()),
         _log("a flipped byte", _flip),
         _log("a flipped byte in its record", _unsealed),
-        _log("another version of its format", lambda: _again(scene={"format_version": "99"})),
-        _log("no name in its record", lambda: _again(scene={"name": None})),
-        _log("a name that leads out of its folder", lambda: _again(scene={"name": "../a"})),
-        _log("a split that is no name of a folder", lambda: _again(scene={"split": "a/b"})),
-        _log("cameras that are no list", lambda: _again(scene={"cameras": "front"})),
-        _log("a camera that it has nothing of", lambda: _again(scene={"cameras": '["side"]'})),
-        _log("no calibration", lambda: _again(_without(CALIBRATION))),
-        _log("a calibration that cannot be decoded", lambda: _again(_broken(CALIBRATION, b"\xff\xff"))),
-        _log("a baseline of 0", lambda: _again(_decoded(topics.camera_topic("front", topics.STEREO), StereoCalibration, baseline_m=0.0))),
-        _log("no disparity", lambda: _again(_without(DISPARITY))),
-        _log("no labels", lambda: _again(_without(LABEL))),
-        _log("no motion", lambda: _again(_without(MOTION))),
-        _log("motion that cannot be decoded", lambda: _again(_broken(MOTION, b"\xff\xff"))),
-        _log("a speed of 1,000,000 m/s", lambda: _again(_decoded(MOTION, Egomotion, **SPEED))),
-        _log("a speed that is not a number", lambda: _again(_decoded(MOTION, Egomotion, speed_mps=float("nan")))),
-        _log("a yaw rate of 9 rad/s", lambda: _again(_decoded(MOTION, Egomotion, yaw_rate_radps=9.0))),
-        _log("a label image that cannot be decoded", lambda: _again(_broken(LABEL, b"\xff\xff"))),
-        _log("messages of another type", lambda: _again(types={DISPARITY: "foxglove.Grid"}), "check logs"),
+        _log("another version of its format", lambda: again(scene={"format_version": "99"})),
+        _log("no name in its record", lambda: again(scene={"name": None})),
+        _log("a name that leads out of its folder", lambda: again(scene={"name": "../a"})),
+        _log("a split that is no name of a folder", lambda: again(scene={"split": "a/b"})),
+        _log("cameras that are no list", lambda: again(scene={"cameras": "front"})),
+        _log("a camera that it has nothing of", lambda: again(scene={"cameras": '["side"]'})),
+        _log("no calibration", lambda: again(_without(CALIBRATION))),
+        _log("a calibration that cannot be decoded", lambda: again(_broken(CALIBRATION, b"\xff\xff"))),
+        _log(
+            "a baseline of 0",
+            lambda: again(_decoded(topics.camera_topic("front", topics.STEREO), StereoCalibration, baseline_m=0.0)),
+        ),
+        _log("no disparity", lambda: again(_without(DISPARITY))),
+        _log("no labels", lambda: again(_without(LABEL))),
+        _log("no motion", lambda: again(_without(MOTION))),
+        _log("motion that cannot be decoded", lambda: again(_broken(MOTION, b"\xff\xff"))),
+        _log("a speed of 1,000,000 m/s", lambda: again(_decoded(MOTION, Egomotion, **SPEED))),
+        _log("a speed that is not a number", lambda: again(_decoded(MOTION, Egomotion, speed_mps=float("nan")))),
+        _log("a yaw rate of 9 rad/s", lambda: again(_decoded(MOTION, Egomotion, yaw_rate_radps=9.0))),
+        _log("a label image that cannot be decoded", lambda: again(_broken(LABEL, b"\xff\xff"))),
+        _log("messages of another type", lambda: again(types={DISPARITY: "foxglove.Grid"}), "check logs"),
         _log("a label image of another size", lambda: _pictures(label_png=SMALL), "check logs"),
-        _log("a disparity image of 8 bit", lambda: _again(_png(DISPARITY, encode_gray(np.zeros((16, 32), np.uint8))))),
-        _log("a label image that is cut", lambda: _again(_png(LABEL, SMALL[:-20]))),
+        _log("a disparity image of 8 bit", lambda: again(_png(DISPARITY, encode_gray(np.zeros((16, 32), np.uint8))))),
+        _log("a label image that is cut", lambda: again(_png(LABEL, SMALL[:-20]))),
         _log("two cameras, none of them named", lambda: _other_camera("logs")),
         _log("a camera that it does not have", lambda: _grid_of("rear"), f"{GRIDS} --config grid.yaml"),
-        _log("two logs of one recording", lambda: shutil.copy(LOG, "logs/b.mcap"), "run baselines --logs logs --out out --workers 1 --device cpu --row BL-DC"),
-        _log("two logs of one name to recover", lambda: (Path("more").mkdir(), shutil.copy(LOG, "more")), "check logs more --recover out"),
-        _log("an earlier recovery in OUT", lambda: (Path("out").mkdir(), shutil.copy(LOG, "out")), "check logs --recover out"),
+        _log(
+            "two logs of one recording",
+            lambda: shutil.copy(LOG, "logs/b.mcap"),
+            "run baselines --logs logs --out out --workers 1 --device cpu --row BL-DC",
+        ),
+        _log(
+            "two logs of one name to recover",
+            lambda: (Path("more").mkdir(), shutil.copy(LOG, "more")),
+            "check logs more --recover out",
+        ),
+        _log(
+            "an earlier recovery in OUT",
+            lambda: (Path("out").mkdir(), shutil.copy(LOG, "out")),
+            "check logs --recover out",
+        ),
+        _log("`latency`: no motion", lambda: again(_without(MOTION)), LATENCY),
+        _log("`latency`: no labels", lambda: again(_without(LABEL)), LATENCY),
+        _log("`latency --right`: an image too few", lambda: _right(3), f"{LATENCY} --right right"),
+        _log("`latency --right`: images of another size", lambda: _right(4), f"{LATENCY} --right right"),
         _log("no log in the folder", LOG.unlink),
         _log("a folder that is called like a log", lambda: (LOG.unlink(), LOG.mkdir())),
     ),
-)  # fmt: skip
+)
 
 
 def _png(topic: str, png: bytes) -> Message:
@@ -191,3 +216,9 @@ def _png(topic: str, png: bytes) -> Message:
 
 def _grid_of(camera: str) -> None:
     Path("grid.yaml").write_text(json.dumps({"sensors": {"full": {"camera": camera}}}))
+
+
+def _right(count: int) -> None:
+    Path("right/street").mkdir(parents=True)
+    for number in range(count):
+        Path(f"right/street/{number}.png").write_bytes(SMALL)

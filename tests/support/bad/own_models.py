@@ -73,7 +73,9 @@ FILES = {
     "a file that is declared and not there": _settings('files = ("mine.pt",)'),
     "baseline that is a word": _settings('baseline = "no"'),
     "no predict": _classes("class Mine(Model):", "    pass"),
-    "an error while it is made": _settings("def __init__(self, settings, given):", "    raise ValueError('no weights')"),
+    "an error while it is made": _settings(
+        "def __init__(self, settings, given):", "    raise ValueError('no weights')"
+    ),
     "an error in fit": _settings("def fit(self, windows):", "    raise OSError('no room')"),
     "an error in predict": _model("raise KeyError('key')"),
     "an error of several lines": _model("raise ValueError('one\\ntwo')"),
@@ -89,17 +91,24 @@ FILES = {
     "a certainty of 3": _model("return 3 * one_hot(batch.past[:, 0, -1])"),
     "a certainty below 0": _model("return one_hot(batch.past[:, 0, -1]) - 2"),
     "a network without forward": _classes(
-        "class Mine(Network):", "    class Settings(NetworkSettings):", "        pass",
-        "    def __init__(self, settings, given):", "        super().__init__(settings, given)",
-        "        self.layer = torch.nn.Linear(1, 1)"),
+        "class Mine(Network):",
+        "    class Settings(NetworkSettings):",
+        "        pass",
+        "    def __init__(self, settings, given):",
+        "        super().__init__(settings, given)",
+        "        self.layer = torch.nn.Linear(1, 1)",
+    ),
     "a network without parameters": _classes(
-        "class Mine(Network):", "    def forward(self, batch):", "        " + ZEROS.format("10, 128, 128")),
+        "class Mine(Network):", "    def forward(self, batch):", "        " + ZEROS.format("10, 128, 128")
+    ),
     "a network whose answer has another size": _network("return grids[..., :64]"),
     "a network whose loss is a word": _network("return grids", "def loss(self, logits, batch):", "    return 'small'"),
-    "a network whose loss has many numbers": _network("return grids", "def loss(self, logits, batch):", "    return logits"),
+    "a network whose loss has many numbers": _network(
+        "return grids", "def loss(self, logits, batch):", "    return logits"
+    ),
     "a network whose loss is not a number": _network("return grids / 0"),
     "a network without optimizer": _network("return grids", "def optimizer(self):", "    return None"),
-}  # fmt: skip
+}
 ENDINGS = {
     "it ends its process": _model("import os; os._exit(3)"),
     "it uses up its memory": _model("torch.zeros(1 << 42)"),

@@ -10,17 +10,18 @@ PAGE = Path(__file__).parents[3] / "docs" / "bad-inputs.md"
 _LONG_LIST = re.compile(r"((?:[\w./-]+, ){2})(?:[\w./:-]+, ){2,}[\w./:-]+")
 _HEAD = """# Bad inputs, and the line that each gets
 
-Whatever is wrong with what you give, the command ends with one line that names file, field and value, an exit code that is
-not 0, and nothing half-written. This page holds {count} bad inputs with their lines. The test suite makes each of them from
-good files, runs the command and compares (`tests/bad_inputs`); the page is written by
+Whatever is wrong with what you give, the command ends with one line that names file, field and value, an exit code
+that is not 0, and nothing half-written. This page holds {count} bad inputs with their lines. The test suite makes each
+of them from good files, runs the command and compares (`tests/bad_inputs`); the page is written by
 
 ```sh
 PYTHONPATH=.:tests python tools/bad_inputs.py
 ```
 
-`Error: ` before each line is left out, as is `Usage: ...` where the command line itself is at fault. `...` stands for the rest
-of a long list, `(digest)` for 16 hexadecimal digits, `(gone)` for a field that is left out. Where a row of a matrix or a
-recording is at fault the others go on, and the exit code is 1. `check` prints a line for each finding; the first error is shown.
+`Error: ` before each line is left out, as is `Usage: ...` where the command line itself is at fault. `...` stands for
+the rest of a long list, `(digest)` for 16 hexadecimal digits, `(gone)` for a field that is left out. Where a row of a
+matrix or a recording is at fault the others go on, and the exit code is 1. `check` prints a line for each finding; the
+first error is shown.
 """
 
 

@@ -115,7 +115,10 @@ KIND = Kind(
         _times("for a window, but from a later input", answer(8, 7)),
         _times("no message"),
         _other("no log for a recording", lambda: LOG.rename("answers/toy5.mcap")),
-        _other("two logs for a recording", lambda: _write(LOG.with_stem("again"), [answer(8, 5)], record={"recording": "toy1"})),
+        _other(
+            "two logs for a recording",
+            lambda: _write(LOG.with_stem("again"), [answer(8, 5)], record={"recording": "toy1"}),
+        ),
         _other("a record that names no recording", lambda: _write(LOG, [answer(8, 5)], record={"name": "a"})),
         _other("no such folder", lambda: shutil.rmtree("answers")),
         _other("a folder without logs", LOG.unlink),
@@ -125,4 +128,4 @@ KIND = Kind(
         _other("a log that is cut", lambda: LOG.write_bytes(LOG.read_bytes()[:-100])),
         _other("a log of another grid than the row's", lambda: None, f"{ANSWERS}, grid: {{spec: {{cell_m: 0.5}}}}"),
     ),
-)  # fmt: skip
+)

@@ -68,7 +68,21 @@ def _smaller(path: Path, name: str, owner: str) -> None:
     write_arrays(path, found | {name: found[name][..., :64]}, owner=owner)
 
 
-_ARRAYS = {"predictions.npz": ("prediction", "certainty")}
+_ARRAYS = {"predictions.npz": ("prediction", "certainty"), "stream.npz": (*results._ANSWERS, *results._EVALUATIONS)}
+
+
+def _without_array(name: str) -> None:
+    folder = _result()
+    path = folder / "predictions.npz"
+    found = read_arrays(path, _ARRAYS[path.name], owner=folder.name)
+    write_arrays(path, {key: each for key, each in found.items() if key != name}, owner=folder.name)
+
+
+def _mine_in_the_way() -> None:
+    Path("page").mkdir()
+    Path("page/index.html").write_text("a page")
+    Path("page/report.json").write_text('{"files": []}')
+    Path("page/scores.csv").write_text("mine")
 
 
 def _bad(words: str, command: str, spoil: Callable[[], object] = lambda: None) -> Bad:
@@ -93,10 +107,16 @@ KIND = Kind(
         _bad("`report`: a folder of something else", "report logs"),
         _bad("`report`: a file", "report base.yaml"),
         _bad("`report`: no run.json", REPORT, Path("run/run.json").unlink),
-        _bad("`report`: run.json is cut", REPORT, lambda: Path("run/run.json").write_bytes(Path("run/run.json").read_bytes()[:200])),
+        _bad(
+            "`report`: run.json is cut",
+            REPORT,
+            lambda: Path("run/run.json").write_bytes(Path("run/run.json").read_bytes()[:200]),
+        ),
         _bad("`report`: run.json is empty", REPORT, lambda: Path("run/run.json").write_bytes(b"")),
         _bad("`report`: run.json is a list", REPORT, lambda: Path("run/run.json").write_text("[]")),
-        _bad("`report`: run.json has no seal", REPORT, lambda: Path("run/run.json").write_text('{"format_version": 1}')),
+        _bad(
+            "`report`: run.json has no seal", REPORT, lambda: Path("run/run.json").write_text('{"format_version": 1}')
+        ),
         _bad("`report`: run.json was changed by hand", REPORT, lambda: _by_hand()),
         _bad("`report`: run.json of another version", REPORT, lambda: _record(format_version=99)),
         _bad("`report`: run.json without rows", REPORT, lambda: _record(rows=...)),
@@ -118,7 +138,18 @@ KIND = Kind(
         _bad("`play`: predictions are damaged", PLAY, lambda: _flip(_result() / "predictions.npz")),
         _bad("`play`: predictions are those of another result", PLAY, lambda: _of_another()),
         _bad("`play`: predictions are empty", PLAY, lambda: (_result() / "predictions.npz").write_bytes(b"")),
-        _bad("`play`: predictions of another size", PLAY, lambda: _smaller(_result() / "predictions.npz", "prediction", _result().name)),
+        _bad(
+            "`play`: predictions of another size",
+            PLAY,
+            lambda: _smaller(_result() / "predictions.npz", "prediction", _result().name),
+        ),
+        _bad("`play`: predictions without certainty", PLAY, lambda: _without_array("certainty")),
+        _bad(
+            "`play`: a stream's grids of another size",
+            LIVE,
+            lambda: _smaller(_result("live") / "stream.npz", "target", _result("live").name),
+        ),
+        _bad("`report`: a file of mine where the page will be", f"{REPORT} --out page", _mine_in_the_way),
         _bad("`play`: windows are gone", PLAY, lambda: _windows().unlink()),
         _bad("`play`: windows are damaged", PLAY, lambda: _flip(_windows())),
         _bad("`play`: result.json is damaged", PLAY, lambda: _flip(_result() / "result.json")),
@@ -126,18 +157,24 @@ KIND = Kind(
         _bad("`play`: result.json of another version", PLAY, lambda: _result_record(format_version=1)),
         _bad("`play`: result.json of another id", PLAY, lambda: _result_record(id="0" * 16)),
         _bad("`play`: result.json without windows", PLAY, lambda: _result_record(windows=...)),
-        _bad("`play`: result.json with a grid that is none", PLAY, lambda: _result_record(config={"grid": {"spec": {"rows": 3}}})),
+        _bad(
+            "`play`: result.json with a grid that is none",
+            PLAY,
+            lambda: _result_record(config={"grid": {"spec": {"rows": 3}}}),
+        ),
         _bad("`play`: a stream's grids are damaged", LIVE, lambda: _flip(_result("live") / "stream.npz")),
         _bad("`play`: --out is a matrix", "play run BL --out base.yaml"),
         _bad("`play`: --out is a log", "play run BL --out logs/val/toy1.mcap"),
         _bad("`play`: --out lies among logs", "play run BL --out logs/val/new.mcap"),
         _bad("`play`: --out lies in --logs", "play run BL --logs logs --out logs/new.mcap"),
-        _bad("`play`: the layout beside --out is another file", PLAY, lambda: Path("play.layout.json").write_text("{}")),
+        _bad(
+            "`play`: the layout beside --out is another file", PLAY, lambda: Path("play.layout.json").write_text("{}")
+        ),
         _bad("`play`: --logs is not there", f"{PLAY} --logs nowhere"),
         _bad("`play`: --logs lacks the log", f"{PLAY} --logs logs/train"),
         _bad("`play`: the log is another now", f"{PLAY} --logs logs", _logs_of_another_run),
     ),
-)  # fmt: skip
+)
 
 
 def _by_hand() -> None:
