@@ -7,7 +7,7 @@ import os
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from semgrid_eval.errors import InputError
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 DIGEST_CHARACTERS = 16
 READ_LIMIT_BYTES, JSON_LIMIT_BYTES = 64 << 30, 256 << 20
 _BLOCK_BYTES = 1 << 20
+_MAX_NAME_BYTES = 200
+_SHOWN = 40  # characters
 
 
 @contextmanager
@@ -184,6 +186,18 @@ def read_bytes(path: Path, *, limit: int = READ_LIMIT_BYTES) -> bytes:
     """Read a whole regular file; an InputError is raised as `open_regular` does."""
     with open_regular(path, limit=limit) as stream, reading(path):
         return stream.read()
+
+
+def require_file_name(text: str, what: str) -> None:
+    """Make sure that a name can be that of a file, with an ending and whatever is put before it.
+
+    Raises:
+        ValueError: it cannot.
+    """
+    can_be = text not in ("", "..") and PurePath(text).name == text and "\0" not in text
+    if not can_be or len(text.encode(errors="replace")) > _MAX_NAME_BYTES:
+        shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+        raise ValueError(f"its {what} {shown!r} is not a file name of at most {_MAX_NAME_BYTES} bytes")
 
 
 def digest_value(value: Any) -> str:  # noqa: ANN401 - anything that JSON can hold

@@ -7,7 +7,6 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import PurePath
 from typing import Any
 
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration as CalibrationMessage
@@ -21,7 +20,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.files import digest_value
+from semgrid_eval.files import digest_value, require_file_name
 from semgrid_eval.geometry import optical_quaternion
 from semgrid_eval.log.schemas.actors_pb2 import Actor as ActorMessage
 from semgrid_eval.log.schemas.actors_pb2 import Actors
@@ -37,7 +36,6 @@ CONDITIONS_RECORD = "semgrid.conditions"
 FORMAT_VERSION = 1
 _NS_PER_S = 1_000_000_000
 _MAX_STAMP_NS = 1 << 63
-_MAX_NAME_BYTES = 200
 _WORDS, _LISTS = ("name", "dataset", "split", "source_digest"), ("cameras", "class_names")  # of a scene
 _SHOWN = 40
 _GPS_FIELDS = ("latitude_deg", "longitude_deg", "heading_deg")
@@ -93,11 +91,15 @@ class Scene:
         return cls(**words, **lists, group=given.get("group", ""))
 
 
-def _names(text: str, what: str) -> tuple[str, ...]:
+def _json(text: str) -> Any:  # noqa: ANN401 - anything that JSON can hold; None for what is no JSON
     try:
-        found = json.loads(text)
+        return json.loads(text)
     except (ValueError, RecursionError):
-        found = None
+        return None
+
+
+def _names(text: str, what: str) -> tuple[str, ...]:
+    found = _json(text)
     if not isinstance(found, list) or not all(isinstance(each, str) for each in found):
         raise ValueError(f"its {what} {text[:_SHOWN]!r} are not a list of names")
     return tuple(found)
@@ -120,34 +122,12 @@ def read_conditions(entries: Mapping[str, str]) -> dict[str, Quantity]:
     Raises:
         ValueError: one does not begin with a finite number.
     """
-    found = {}
-    for name, text in entries.items():
-        value, _, unit = text.partition(" ")
-        if (number := _number(value)) is None:
+    parts = {name: text.partition(" ") for name, text in entries.items()}
+    found = {name: Quantity(_json(value), unit) for name, (value, _, unit) in parts.items()}
+    for name, each in found.items():
+        if type(each.value) not in (int, float) or not math.isfinite(each.value):
             raise ValueError(f"its condition {name[:_SHOWN]!r} is not a number")
-        found[name] = Quantity(number, unit)
     return found
-
-
-def _number(text: str) -> float | None:
-    """Read a finite number as it was written, whole or not; None where there is none."""
-    try:
-        found = json.loads(text)
-    except (ValueError, RecursionError):
-        return None
-    return found if type(found) in (int, float) and math.isfinite(found) else None
-
-
-def require_file_name(text: str, what: str) -> None:
-    """Make sure that a name can be that of a file, with an ending and whatever is put before it.
-
-    Raises:
-        ValueError: it cannot.
-    """
-    can_be = text not in ("", "..") and PurePath(text).name == text and "\0" not in text
-    if not can_be or len(text.encode(errors="replace")) > _MAX_NAME_BYTES:
-        shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
-        raise ValueError(f"its {what} {shown!r} is not a file name of at most {_MAX_NAME_BYTES} bytes")
 
 
 def timestamp(stamp_ns: int) -> Timestamp:

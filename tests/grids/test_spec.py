@@ -98,8 +98,8 @@ def test_a_point_at_a_cells_centre_is_drawn_in_that_cell(spec):
         ({"morphology": "none"}, "morphology"),
         ({"spec": {"rows": 0}}, "spec.rows"),
         ({"sensors": {"full": {"image_size_px": [4, 4]}}}, "sensors.full: .*outside 16 to 8192"),
-        ({"sensors": {"full": {"bottom_px": 300}}}, "sensors.full: .*reaches beyond the image"),
-        ({"sensors": {"full": {"bottom_px": 30, "top_px": 30}}}, "sensors.full: .*covers no pixel"),
+        ({"sensors": {"full": {"bottom_px": 300}}}, "sensors.full: .*reach beyond the image"),
+        ({"sensors": {"full": {"bottom_px": 30, "top_px": 30}}}, "sensors.full: .*cover no pixel"),
         (
             {"sensors": {"full": {"top": 30}}},
             "sensors.full: top: unknown key; allowed here: bottom_px, camera, .*top_px",

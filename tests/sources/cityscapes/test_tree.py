@@ -245,7 +245,7 @@ def test_text_that_is_not_a_time_stamp_is_named(tree, text):
         (lambda value: value.update(extrinsic=[1]), "extrinsic.baseline: is missing"),
         (lambda value: value["extrinsic"].update(pitch=float("nan")), "extrinsic.pitch: nan is not a finite number"),
         (lambda value: value["extrinsic"].update(z="high"), "extrinsic.z: 'high' is not a number"),
-        (lambda value: value["intrinsic"].update(v0=True), "intrinsic.v0: 'True' is not a number"),
+        (lambda value: value["intrinsic"].update(v0=True), "intrinsic.v0: true is not a number"),
         (lambda value: value["intrinsic"].update(fx=-1), "intrinsic.fx: -1.0 is not positive"),
         (lambda value: value["extrinsic"].update(baseline=0), "extrinsic.baseline: 0.0 is not positive"),
     ],
@@ -262,7 +262,7 @@ def test_fault_in_a_camera_file_names_file_and_field(tree, change, expected):
         (lambda value: value.pop("speed"), "speed: is missing"),
         (lambda value: value.update(yawRate=float("inf")), "yawRate: inf is not a finite number"),
         (lambda value: value.update(gpsLatitude=float("nan")), "gpsLatitude: nan is not a finite number"),
-        (lambda value: value.update(speed=None), "speed: 'None' is not a number"),
+        (lambda value: value.update(speed=None), "speed: null is not a number"),
     ],
 )
 def test_fault_in_a_vehicle_file_names_file_and_field(tree, change, expected):

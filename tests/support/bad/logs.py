@@ -65,11 +65,10 @@ def as_it_is(topic: str, data: bytes) -> bytes | None:
 def again(message: Message = as_it_is, scene: dict[str, str] | None = None, **changes: object) -> None:
     """Write the log again with checksums that hold: other messages, another record, other times or types."""
     content = LOG.read_bytes()
-    reader = make_reader(LOG.open("rb"))
-    with LOG.with_suffix(".new").open("wb") as stream:
+    with LOG.open("rb") as old, LOG.with_suffix(".new").open("wb") as stream:
         writer = Writer(stream, enable_data_crcs=True)
         writer.start(profile="", library="")
-        copy(reader, writer, message, scene, changes)
+        copy(make_reader(old), writer, message, scene, changes)
         writer.finish()
     LOG.with_suffix(".new").rename(LOG)
     assert LOG.read_bytes() != content
