@@ -16,10 +16,12 @@ model: fresh
 model: residual-town, window: {step_frames: 3, target_frame: null, lead_ms: 1300}
 model: newest, window: {inputs: 12, step_frames: 1, target_frame: null}, stream: {latency_ms: 50}
 """
+SMALL = "settings: {features: 4, depth: 2, training: {epochs: 1, updates_per_epoch: 1, batch: 2}}"
+WATCHED = "model: ed, window: {step_frames: 3, target_frame: 7, lead_ms: 300}, stream: {latency_ms: 50, asked: fixed}"
 KIND = Kind(
     "Rows that do not fit the logs",
     "A row that is sound, run on logs of nine frames with one camera.",
     small.whole,
-    table(small.RUN, "bad.yaml", {line: small.matrix(line) for line in lines(ROWS)}),
+    table(small.RUN, "bad.yaml", {line: small.matrix(line) for line in [*lines(ROWS), f"{WATCHED}, {SMALL}"]}),
     shows_code=True,
 )
