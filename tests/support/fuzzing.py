@@ -350,7 +350,8 @@ def json_inputs(folder: Path) -> dict[str, bytes]:
 def yaml_inputs(folder: Path) -> dict[str, bytes]:
     made = {"contract/default.yaml": contract_text(default_contract()).encode()}
     made |= {f"matrix/{path.name}": path.read_bytes() for path in PRESETS.glob("*.yaml")}
-    return made | corpus("contract", "matrix", "yaml")
+    bad = corpus("contract", "matrix", "yaml")
+    return made | dict(list(bad.items())[::8])  # most that is made of what is bad is bad, too
 
 
 def read_of_kind(folder: Path, name: str) -> object:
