@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -10,11 +10,13 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from semgrid_eval.errors import ConfigError, InputError
+from semgrid_eval.faults import in_words, not_one_of, unknown_key, unreadable
 from semgrid_eval.files import read_bytes
 
 _YAML_LIMIT_BYTES = 1 << 20
 _LONGEST_NUMBER = 40  # characters
 _SHOWN = 20
+_UNKNOWN = "extra_forbidden"
 
 
 class Config(BaseModel):
@@ -109,11 +111,13 @@ def of_kind(value: object, kinds: Mapping[str, type[BaseModel]], default: str | 
     if not isinstance(value, Mapping):
         return value
     kind = value.get("kind", default)
+    if kind is None:
+        raise ValueError(f"kind: is missing; it is one of {', '.join(kinds)}")
     if kind not in tuple(kinds):
-        raise ValueError(f"kind {kind!r} is not one of {', '.join(kinds)}")
+        raise ValueError(f"kind: {not_one_of(kind, kinds)}")
     config = kinds[kind]
     if unknown := [key for key in value if key not in config.model_fields]:
-        raise ValueError(f"unknown key {unknown[0]!r}; allowed here: {', '.join(sorted(config.model_fields))}")
+        raise ValueError(f"{unknown[0]}: {unknown_key(unknown[0], sorted(config.model_fields))}")
     return strictly(config, value)
 
 
@@ -144,28 +148,27 @@ def load_yaml(path: Path) -> Any:  # noqa: ANN401 - anything that YAML can hold
         raise ConfigError(str(error).removeprefix(f"{path}: "), path=path) from error
     try:
         return yaml.load(content.decode(), Loader=_StrictLoader)
-    except yaml.MarkedYAMLError as error:
-        place = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
-        raise ConfigError(f"is not valid YAML: {place}{error.problem}", path=path) from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: not UTF-8, or a number of 5,000 digits
-        raise ConfigError(f"is not valid YAML: {error}", path=path) from error
+        raise ConfigError(f"is not valid YAML: {unreadable(error)}", path=path) from error
 
 
 def _first_fault(model: type[BaseModel], error: ValidationError, path: Path | str | None) -> ConfigError:
     faults = error.errors(include_url=False)
     # A misspelt key is also a missing one, and says more.
-    fault = next((each for each in faults if each["type"] == "extra_forbidden"), faults[0])
-    place = ".".join(str(part) for part in fault["loc"]) or "(top level)"
-    message = fault["msg"].removeprefix("Value error, ")
-    if fault["type"] == "extra_forbidden":
-        allowed = ", ".join(_allowed_keys(model, fault["loc"][:-1])) or "none"
-        return ConfigError(f"unknown key; allowed here: {allowed}", path=path, field=place)
-    shown = repr(fault.get("input"))
-    shown = shown if len(shown) <= 80 else shown[:77] + "..."
-    return ConfigError(f"{message} (found {shown})", path=path, field=place)
+    fault = next((each for each in faults if each["type"] == _UNKNOWN), faults[0])
+    *above, last = fault["loc"] or ("",)
+    if fault["type"] == _UNKNOWN:
+        return ConfigError(unknown_key(str(last), _allowed_keys(model, above)), path=path, field=_place(fault["loc"]))
+    if fault["type"] == "missing" and isinstance(last, int):  # of a list with a fixed number of entries
+        return ConfigError(f"entry {last + 1} is missing", path=path, field=_place(above))
+    return ConfigError(in_words(fault), path=path, field=_place(fault["loc"]))
 
 
-def _allowed_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
+def _place(location: Iterable[int | str]) -> str | None:
+    return ".".join(str(part) for part in location if part != "[key]") or None
+
+
+def _allowed_keys(model: type[BaseModel], location: Iterable[int | str]) -> list[str]:
     """Walk down the config classes along `location` as far as their annotations tell."""
     current: type[BaseModel] | None = model
     for part in location:

@@ -1,6 +1,5 @@
 """The family of errors that a user can cause; each message is one line that names file, field and value."""
 
-from collections.abc import Iterable
 from pathlib import Path
 
 
@@ -50,14 +49,6 @@ class MissingExtraError(SemgridError):
 
     def __init__(self, extra: str, package: str) -> None:
         super().__init__(f"{package} is not installed; run: pip install 'semgrid-eval[{extra}]'")
-
-
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" for the known word that is most like one that is not known; nothing if none is."""
-    from difflib import get_close_matches  # here, where something is wrong already
-
-    found = get_close_matches(word, list(known), n=1)
-    return f"; did you mean {found[0]!r}?" if found else ""
 
 
 def first_line(error: BaseException) -> str:

@@ -7,10 +7,11 @@ import os
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.faults import unreadable
 from semgrid_eval.places import held_folder, hold, partial_of, put, restore
 
 if TYPE_CHECKING:
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 DIGEST_CHARACTERS = 16
 READ_LIMIT_BYTES, JSON_LIMIT_BYTES = 64 << 30, 256 << 20
 _BLOCK_BYTES = 1 << 20
+_MAX_NAME_BYTES = 200
+_SHOWN = 40  # characters
 
 
 @contextmanager
@@ -149,7 +152,7 @@ def read_json(path: Path, *, limit: int = JSON_LIMIT_BYTES) -> Any:  # noqa: ANN
     try:
         return json.loads(content)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"is not valid JSON: {error}", path=path) from error
+        raise InputError(f"is not valid JSON: {unreadable(error)}", path=path) from error
 
 
 def open_regular(path: Path, *, limit: int = READ_LIMIT_BYTES) -> BinaryIO:
@@ -164,7 +167,7 @@ def open_regular(path: Path, *, limit: int = READ_LIMIT_BYTES) -> BinaryIO:
     if stat.S_ISREG(found.st_mode) and found.st_size <= limit:
         return os.fdopen(descriptor, "rb")
     os.close(descriptor)
-    large = f"has {found.st_size >> 20} MiB, and {limit >> 20} are allowed"
+    large = f"has {found.st_size} bytes, and {limit} are allowed"
     raise InputError(large if stat.S_ISREG(found.st_mode) else "is not a regular file", path=path)
 
 
@@ -183,6 +186,18 @@ def read_bytes(path: Path, *, limit: int = READ_LIMIT_BYTES) -> bytes:
     """Read a whole regular file; an InputError is raised as `open_regular` does."""
     with open_regular(path, limit=limit) as stream, reading(path):
         return stream.read()
+
+
+def require_file_name(text: str, what: str) -> None:
+    """Make sure that a name can be that of a file, with an ending and whatever is put before it.
+
+    Raises:
+        ValueError: it cannot.
+    """
+    can_be = text not in ("", "..") and PurePath(text).name == text and "\0" not in text
+    if not can_be or len(text.encode(errors="replace")) > _MAX_NAME_BYTES:
+        shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+        raise ValueError(f"its {what} {shown!r} is not a file name of at most {_MAX_NAME_BYTES} bytes")
 
 
 def digest_value(value: Any) -> str:  # noqa: ANN401 - anything that JSON can hold
@@ -208,5 +223,7 @@ def digest_files(paths: Iterable[Path], *, limit: int = READ_LIMIT_BYTES) -> str
 
 
 def _reason(error: OSError) -> str:
+    if isinstance(error, FileExistsError) and error.filename is not None:
+        return f"{os.fsdecode(error.filename)} is there and is not a folder"
     # numpy has no error number for arrays that were written in part.
     return error.strerror or f"{error} (no space left?)"

@@ -11,6 +11,7 @@ import torch
 from semgrid_eval.bench import data, networks
 from semgrid_eval.bench.measurement import Measurement, Settings
 from semgrid_eval.errors import ConfigError
+from semgrid_eval.faults import not_one_of
 from semgrid_eval.models.device import cpu_facts
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.runs.record import machine, versions
@@ -37,7 +38,7 @@ def measure(
     """
     unknown = [part for part in parts if part not in PARTS]
     if unknown:
-        raise ConfigError(f"{unknown[0]!r} is not one of: {', '.join(PARTS)}", field="part")
+        raise ConfigError(not_one_of(unknown[0], PARTS), field="part")
     chosen = [part for part in PARTS if part in parts]
     found: dict[str, list[Measurement]] = {}
     with tempfile.TemporaryDirectory(prefix="semgrid-bench-") as folder:

@@ -8,6 +8,7 @@ import click
 
 from semgrid_eval.cli.console import loudness_options, say
 from semgrid_eval.cli.options import FOLDER
+from semgrid_eval.cli.types import Number
 
 if TYPE_CHECKING:
     from semgrid_eval.runs.caches import Kept
@@ -21,7 +22,7 @@ _DAYS = "Keep what was used within so many days."
 @click.argument("folders", metavar="FOLDER...", nargs=-1, required=True, type=_FOLDERS)
 @click.option("--list/--clean", "listed", default=True, help="List what is kept, or remove what nobody uses.")
 @click.option("--run", "runs", multiple=True, type=FOLDER, help=_RUN)
-@click.option("--older-than", "days", type=click.FloatRange(0), metavar="DAYS", help=_DAYS)
+@click.option("--older-than", "days", type=Number(0), metavar="DAYS", help=_DAYS)
 @click.option("--yes", is_flag=True, help="Remove it; without this, --clean only says what would go.")
 @loudness_options
 def command(folders: tuple[Path, ...], runs: tuple[Path, ...], days: float | None, *, listed: bool, yes: bool) -> None:

@@ -8,6 +8,7 @@ import click
 from semgrid_eval.cli.console import command_line, loudness_options, progress, say
 from semgrid_eval.cli.converted import show
 from semgrid_eval.cli.options import FOLDER, device_option, workers_option
+from semgrid_eval.cli.types import Whole
 
 PRESET = "demo"
 TOWNS = 8
@@ -16,8 +17,8 @@ TOWNS = 8
 
 @click.command("demo", epilog="Example: semgrid-eval demo --out demo")
 @click.option("--out", default="demo", show_default=True, type=FOLDER)
-@click.option("--recordings", type=click.IntRange(4, 10_000), default=96, show_default=True, help="Drives to simulate.")
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
+@click.option("--recordings", type=Whole(4, 10_000), default=96, show_default=True, help="Drives to simulate.")
+@click.option("--seed", type=Whole(0), default=1, show_default=True)
 @device_option
 @workers_option("Processes at once.")
 @loudness_options
@@ -30,6 +31,7 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
     from semgrid_eval.config import parse_config
     from semgrid_eval.executors import local_executor
     from semgrid_eval.log.convert import Work
+    from semgrid_eval.models.device import choose_device
     from semgrid_eval.report.page.write import write_report
     from semgrid_eval.runs.matrix import load_matrix
     from semgrid_eval.runs.runner import RunOptions, run_matrix
@@ -37,6 +39,7 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
     from semgrid_eval.sources.town.convert import convert_town
 
     start_s = time.monotonic()
+    choose_device(device)  # what cannot be used is said before the towns are built
     logs, run = out / "logs", out / "run"
     config = parse_config(SyntheticConfig, {"recordings": recordings, "seed": seed, "towns": TOWNS})
     code = show(convert_town(config, logs, Work(workers, stage=progress)), logs)

@@ -9,6 +9,7 @@ import click
 from semgrid_eval.cli.console import command_line, loudness_options, progress, say
 from semgrid_eval.cli.fields import parameters_of
 from semgrid_eval.cli.options import FOLDER, device_option, logs_argument
+from semgrid_eval.cli.types import Whole
 from semgrid_eval.config import parse_config
 from semgrid_eval.segmentation.config import SegmentationConfig
 
@@ -32,11 +33,11 @@ _SHOWN = ("processor", "cores", "threads", "device", "gpu", "clock")
         click.Option(["--segment"], type=_ONNX, help=_SEGMENT),
         *parameters_of(SegmentationConfig),
         click.Option(["--right"], type=FOLDER, help=_RIGHT),
-        click.Option(["--frames"], type=click.IntRange(1, 100_000), default=300, show_default=True, help="At most."),
+        click.Option(["--frames"], type=Whole(1, 100_000), default=300, show_default=True, help="At most."),
         click.Option(
-            ["--warm-up"], type=click.IntRange(0), default=20, show_default=True, help="Frames before those that count."
+            ["--warm-up"], type=Whole(0), default=20, show_default=True, help="Frames before those that count."
         ),
-        click.Option(["--threads"], type=click.IntRange(1, 1024), help="Of networks and matching.  [default: theirs]"),
+        click.Option(["--threads"], type=Whole(1, 1024), help="Of networks and matching.  [default: theirs]"),
         click.Option(["--processor-time"], is_flag=True, help=_PROCESSOR),
         click.Option(["--out"], required=True, type=_FILE, help="File of the profile."),
     ],

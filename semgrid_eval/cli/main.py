@@ -67,7 +67,7 @@ def main(arguments: list[str] | None = None) -> None:
     _open_streams()
     try:
         with _terminable(), _warned():
-            result: Any = cli.main(args=arguments, standalone_mode=False)
+            result: Any = cli.main(args=arguments, prog_name="semgrid-eval", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:
         with suppress(OSError):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from semgrid_eval.cli.console import Command
+from semgrid_eval.cli.types import Number, Whole
 from semgrid_eval.workplace import LOCAL, Limits
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
 THERE = click.Path(path_type=Path, exists=True)
-WORKERS = click.IntRange(1, 256)
+WORKERS = Whole(1, 256)
 
 
 class _Pattern(click.Path):
@@ -81,14 +82,14 @@ def own_model_options(command: Command) -> Command:
     )
     time = click.option(
         "--time-limit",
-        type=click.FloatRange(0, min_open=True),
+        type=Number(0, min_open=True),
         default=Limits.time_s,
         show_default=True,
         help="Seconds in which code of your own, apart, has to give a sign: an update, a batch, the end of its `fit`.",
     )
     memory = click.option(
         "--memory-limit",
-        type=click.FloatRange(0, min_open=True),
+        type=Number(0, min_open=True),
         show_default="7/8 of the machine's",
         help="GiB that code of your own, apart, may use.",
     )

@@ -16,6 +16,7 @@ from semgrid_eval.cli.options import (
     own_model_options,
     workers_option,
 )
+from semgrid_eval.cli.types import Number, Whole
 from semgrid_eval.errors import printable
 from semgrid_eval.workplace import LOCAL
 
@@ -38,11 +39,11 @@ _MODEL = "One more row: a model of your own, path.py:Class, or an installed one.
 @click.option("--model", "models", multiple=True, help=_MODEL)
 @click.option("--row", "only", multiple=True, help="Only this row, or rows like 'BL-*'; may be repeated.")
 @device_option
-@click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Rows trained at once.")
+@click.option("--jobs", type=Whole(1, 256), default=1, show_default=True, help="Rows trained at once.")
 @workers_option("Logs made into grids at once.")
 @executor_options
 @own_model_options
-@click.option("--gpus", type=click.FloatRange(0), default=0.0, help="With Ray: GPUs for each row; fractions share one.")
+@click.option("--gpus", type=Number(0), default=0.0, help="With Ray: GPUs for each row; fractions share one.")
 @click.option(
     "--pictures/--no-pictures", default=True, show_default=True, help="Keep small pictures for the report's examples."
 )

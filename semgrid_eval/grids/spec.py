@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, NO_POINT, class_map
 from semgrid_eval.config import Config
+from semgrid_eval.faults import meant, not_one_of
 from semgrid_eval.motion import Integrator
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sensors.kinds import Sensor, SensorName
@@ -72,14 +73,14 @@ class GridConfig(Config):
     def _sound(self) -> Self:
         for sensor in self.target:
             if sensor not in self.sensors:
-                raise ValueError(f"target: {sensor!r} is not one of the sensors {', '.join(self.sensors)}")
+                raise ValueError(f"target: {not_one_of(sensor, self.sensors)}")
         if len(set(self.target)) < len(self.target):
             raise ValueError("target: a sensor repeats")
         for label, name in self.class_map.items():
             if label not in LABEL_ID:
-                raise ValueError(f"class_map: {label!r} is not a Cityscapes label")
+                raise ValueError(f"class_map: {label!r} is not a Cityscapes label{meant(label, LABEL_ID)}")
             if name is not None and name not in CLASS_NAMES:
-                raise ValueError(f"class_map.{label}: {name!r} is not one of {', '.join(CLASS_NAMES)}")
+                raise ValueError(f"class_map.{label}: {not_one_of(name, CLASS_NAMES)}")
         return self
 
     @property

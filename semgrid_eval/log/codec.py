@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import PurePath
+from typing import Any
 
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration as CalibrationMessage
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
@@ -20,7 +20,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.files import digest_value
+from semgrid_eval.files import digest_value, require_file_name
 from semgrid_eval.geometry import optical_quaternion
 from semgrid_eval.log.schemas.actors_pb2 import Actor as ActorMessage
 from semgrid_eval.log.schemas.actors_pb2 import Actors
@@ -36,7 +36,7 @@ CONDITIONS_RECORD = "semgrid.conditions"
 FORMAT_VERSION = 1
 _NS_PER_S = 1_000_000_000
 _MAX_STAMP_NS = 1 << 63
-_MAX_NAME_BYTES = 200
+_WORDS, _LISTS = ("name", "dataset", "split", "source_digest"), ("cameras", "class_names")  # of a scene
 _SHOWN = 40
 _GPS_FIELDS = ("latitude_deg", "longitude_deg", "heading_deg")
 _INTRINSICS = ("fx_px", "fy_px", "u0_px", "v0_px")
@@ -82,11 +82,27 @@ class Scene:
             raise ValueError(f"metadata {RECORD} does not match its digest")
         if given.get("format_version") != str(FORMAT_VERSION):
             raise ValueError(f"its format version is {given.get('format_version')}; {FORMAT_VERSION} can be read")
+        if missing := [name for name in (*_WORDS, *_LISTS) if name not in given]:
+            raise ValueError(f"metadata {RECORD} does not say its {missing[0]}")
         for key in ("name", "split"):
             require_file_name(given[key], key)
-        words = {name: given[name] for name in ("name", "dataset", "split", "source_digest")}
-        cameras, class_names = (tuple(json.loads(given[name])) for name in ("cameras", "class_names"))
-        return cls(**words, cameras=cameras, class_names=class_names, group=given.get("group", ""))
+        words: dict[str, Any] = {name: given[name] for name in _WORDS}
+        lists: dict[str, Any] = {name: _names(given[name], name) for name in _LISTS}
+        return cls(**words, **lists, group=given.get("group", ""))
+
+
+def _json(text: str) -> Any:  # noqa: ANN401 - anything that JSON can hold; None for what is no JSON
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _names(text: str, what: str) -> tuple[str, ...]:
+    found = _json(text)
+    if not isinstance(found, list) or not all(isinstance(each, str) for each in found):
+        raise ValueError(f"its {what} {text[:_SHOWN]!r} are not a list of names")
+    return tuple(found)
 
 
 def is_scene_whole(entries: Mapping[str, str]) -> bool:
@@ -107,23 +123,11 @@ def read_conditions(entries: Mapping[str, str]) -> dict[str, Quantity]:
         ValueError: one does not begin with a finite number.
     """
     parts = {name: text.partition(" ") for name, text in entries.items()}
-    found = {name: Quantity(json.loads(value), unit) for name, (value, _, unit) in parts.items()}
+    found = {name: Quantity(_json(value), unit) for name, (value, _, unit) in parts.items()}
     for name, each in found.items():
         if type(each.value) not in (int, float) or not math.isfinite(each.value):
             raise ValueError(f"its condition {name[:_SHOWN]!r} is not a number")
     return found
-
-
-def require_file_name(text: str, what: str) -> None:
-    """Make sure that a name can be that of a file, with an ending and whatever is put before it.
-
-    Raises:
-        ValueError: it cannot.
-    """
-    can_be = text not in ("", "..") and PurePath(text).name == text and "\0" not in text
-    if not can_be or len(text.encode(errors="replace")) > _MAX_NAME_BYTES:
-        shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
-        raise ValueError(f"its {what} {shown!r} is not a file name of at most {_MAX_NAME_BYTES} bytes")
 
 
 def timestamp(stamp_ns: int) -> Timestamp:

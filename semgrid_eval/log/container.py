@@ -21,7 +21,6 @@ from semgrid_eval.log.records import (
     MAGIC,
     MAX_CHUNK_BYTES,
     data_crc,
-    exactly,
     read_at,
     read_attachment,
     read_chunk,
@@ -35,14 +34,14 @@ _BLOCK_BYTES = 1 << 20
 
 
 @contextmanager
-def damage_as_log_error(path: Path) -> Iterator[None]:
-    """Turn whatever a damaged file makes the libraries raise into a `LogError` that names the file."""
+def damage_as_log_error(path: Path, field: str | None = None) -> Iterator[None]:
+    """Turn whatever a damaged file makes the libraries raise into a `LogError` that names the file, and the field."""
     try:
         yield
     except OSError as error:
         raise LogError(f"cannot be read: {error.strerror or error}", path=path) from error
     except DAMAGE as error:
-        raise LogError(f"is damaged: {str(error) or type(error).__name__}", path=path) from error
+        raise LogError(f"is damaged: {str(error) or type(error).__name__}", path=path, field=field) from error
 
 
 class Entry(NamedTuple):
@@ -144,7 +143,7 @@ class Container:
             raise LogError("is damaged: the checksum of its data does not match", path=self.path)
 
     def _load(self) -> None:
-        if exactly(self._stream, len(MAGIC)) != MAGIC:
+        if self._stream.read(len(MAGIC)) != MAGIC:
             raise McapError("it does not begin as an MCAP file")
         self._index = read_index(self._stream)
         self.summary = self._index.summary

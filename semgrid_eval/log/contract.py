@@ -8,6 +8,7 @@ import yaml
 from pydantic import Field, field_validator, model_validator
 
 from semgrid_eval.config import Config, load_yaml, parse_config
+from semgrid_eval.faults import unknown_key
 from semgrid_eval.log.findings import Severity
 from semgrid_eval.log.quantities import quantities_of
 
@@ -100,8 +101,7 @@ class Contract(Config):
         for topic, expected in value.items():
             allowed = quantities_of(topic)
             if unknown := [name for name in expected.values if name not in allowed]:
-                known = ", ".join(allowed) or "none"
-                raise ValueError(f"{topic}: values: unknown key {unknown[0]!r}; allowed here: {known}")
+                raise ValueError(f"{topic}.values.{unknown[0]}: {unknown_key(unknown[0], allowed)}")
         return value
 
 

@@ -111,6 +111,8 @@ class PredictionLog(Container):
             return self._wanted
         below = [topic for topic in found if topic.startswith(f"{GRID_PREDICTION}/")]
         chosen = found if len(found) == 1 else below
+        if not found:
+            raise LogError(f"holds no {SCHEMA}", path=self.path, field="topic")
         if len(chosen) != 1:
             raise LogError(f"holds {SCHEMA} as {_listed(chosen or found)}: name one", path=self.path, field="topic")
         return chosen[0]

@@ -107,7 +107,7 @@ class LogReader(Container):
         known = self._first(camera_topic(camera, topics.CALIBRATION))
         rest = self._first(camera_topic(camera, topics.STEREO))
         try:
-            with damage_as_log_error(self.path):
+            with damage_as_log_error(self.path, camera_topic(camera, topics.CALIBRATION)):
                 return codec.read_calibration(known, rest)
         except LogError:
             raise
@@ -166,7 +166,7 @@ class LogReader(Container):
     def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
         """Iterate over what messages say; `decoders` maps topics to what reads their messages."""
         for topic, stamp_ns, data, _ in self.messages(decoders):
-            with damage_as_log_error(self.path):
+            with damage_as_log_error(self.path, f"{topic} at {stamp_ns} ns"):
                 value = decoders[topic](data)
             yield Decoded(topic, stamp_ns, value)
 

@@ -15,7 +15,7 @@ from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 
@@ -97,7 +97,10 @@ def unpack_chunk(chunk: records.Chunk) -> list[records.McapRecord]:
     """Return the schemas, channels and messages of a chunk; where it has a checksum, it holds."""
     chunk.data = _decompress(chunk)
     chunk.compression = ""
-    return breakup_chunk(chunk, validate_crc=True)
+    try:
+        return breakup_chunk(chunk, validate_crc=True)
+    except CRCValidationError:
+        raise McapError("the checksum of a chunk does not match") from None
 
 
 def read_attachment(body: bytes) -> records.Attachment:

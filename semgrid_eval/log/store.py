@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.files import atomic_file
-from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene, conditions_metadata, require_file_name
+from semgrid_eval.files import atomic_file, require_file_name
+from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene, conditions_metadata
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.writer import MessageWriter, MomentWriter
 from semgrid_eval.recording.types import Moment, Recording

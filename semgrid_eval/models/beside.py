@@ -35,8 +35,11 @@ class Code:
 
 def require_python(path: Path) -> None:
     """Make sure that a path may be a model's file; an InputError says that it is not."""
-    if not path.is_file() or path.suffix != ".py":
-        raise InputError("is not a Python file; a model is given as path.py:Class", path=path)
+    if path.suffix != ".py":
+        raise InputError("is not a Python file (.py); a model is given as path.py:Class", path=path)
+    if not path.is_file():
+        fault = "is not a file" if path.exists() else "is not there"
+        raise InputError(f"{fault}; a model is given as path.py:Class", path=path)
 
 
 class ModelFile:

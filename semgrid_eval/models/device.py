@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -10,7 +11,7 @@ from typing import Literal
 
 import torch
 
-from semgrid_eval.errors import ConfigError
+from semgrid_eval.errors import ConfigError, first_line
 
 Precision = Literal["auto", "float32", "bf16"]
 
@@ -90,6 +91,13 @@ def settle_process() -> None:
         return
     for parameter, value in _MALLOPT.items():
         mallopt(parameter, value)
+
+
+def memory_words(error: BaseException) -> str:
+    """Say in one line what did not fit into memory."""
+    asked = re.search(r"allocate (\d+) bytes", str(error))
+    size = f"{int(asked[1]) / (1 << 30):.1f} GiB were asked for at once" if asked else first_line(error)
+    return f"out of memory: {size}"
 
 
 def is_out_of_memory(error: BaseException) -> bool:

@@ -31,7 +31,7 @@ class EncoderDecoderSettings(NetworkSettings):
     @classmethod
     def _can_be_halved(cls, features: int) -> int:
         if features % 2:
-            raise ValueError("features must be even, because the last block halves them")
+            raise ValueError(f"{features} is odd, and the last block halves it")
         return features
 
 

@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 from semgrid_eval.apart import Apart, ApartError
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.files import digest_files, digest_value
+from semgrid_eval.models.device import memory_words
 from semgrid_eval.models.model import Model
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.workplace import Limits
@@ -39,7 +40,7 @@ class Host:
             try:
                 self.known[key] = {"found": self.ask(what, **given)[0]}
             except MemoryError as error:
-                raise InputError(f"out of memory: {error}", field=self.name) from error
+                raise InputError(memory_words(error), field=self.name) from error
             except InputError as error:
                 if not isinstance(error.__cause__, ApartError):
                     raise

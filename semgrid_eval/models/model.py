@@ -152,7 +152,7 @@ def require_answer(answer: object, batch: WindowBatch, name: str) -> Tensor:
         InputError: it is not; the message begins with the name of its model.
     """
     if not isinstance(answer, Tensor):
-        raise InputError(f"gave a {type(answer).__name__} where a tensor is needed", field=name)
+        raise InputError(f"gave {type(answer).__name__} where a tensor is needed", field=name)
     count, rows, columns = batch.target.shape
     needed = (count, CLASS_COUNT, rows, columns)
     if answer.ndim == 4 and answer.shape[1] < CLASS_COUNT and answer.shape[0] == count:

@@ -41,7 +41,8 @@ class OverlaySensors(Baseline):
         """Refuse sensors of which not exactly one is to be on top."""
         if sum(settings.top in name for name in given.sensors) != 1:
             raise ConfigError(
-                f"not one of {', '.join(given.sensors)} alone has {settings.top!r} in its name", field="settings.top"
+                f"{settings.top!r} must be part of the name of one sensor alone, of {', '.join(given.sensors)}",
+                field="settings.top",
             )
 
     def predict(self, batch: WindowBatch) -> Tensor:

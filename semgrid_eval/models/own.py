@@ -77,7 +77,7 @@ class _Guarded(Model):
         with cls._guard():
             found = super().answers_in(settings)
         if found is not None and not isinstance(found, AnswersIn):
-            raise InputError(f"gave a {type(found).__name__} where `AnswersIn` is needed", field=cls._own_name)
+            raise InputError(f"gave {type(found).__name__} where `AnswersIn` is needed", field=cls._own_name)
         return found
 
     @classmethod
@@ -110,7 +110,10 @@ class _GuardedNetwork(_Guarded, Network):
 
     def optimizer(self) -> torch.optim.Optimizer:
         with self._guard():
-            return super().optimizer()
+            found = super().optimizer()
+        if not isinstance(found, torch.optim.Optimizer):
+            raise InputError(f"gave {type(found).__name__} where an optimizer of torch is needed", field=self._own_name)
+        return found
 
 
 def guarded(cls: object, spec: str, file: ModelFile | None) -> type[Model]:
@@ -122,7 +125,8 @@ def guarded(cls: object, spec: str, file: ModelFile | None) -> type[Model]:
         raise InputError(f"has `Settings` that do not have `{base.__name__}` as their base", field=spec)
     for name, kind in _ATTRIBUTES.items():
         if not isinstance(value := getattr(cls, name), kind):
-            raise InputError(f"is {value!r}, which is not of the type that it has to be", field=f"{spec}: {name}")
+            needed = getattr(kind, "__name__", kind)
+            raise InputError(f"must be of type {needed}, not {value!r}", field=f"{spec}: {name}")
     guard = _GuardedNetwork if issubclass(cls, Network) else _Guarded
     facts = {"_own_name": spec, "_own_file": file, "family": cls.family or cls.__name__, "__module__": cls.__module__}
     unfitted = {} if cls.learns() else {"fit": Model.fit}  # the guard's own would look as if it learned

@@ -8,6 +8,7 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.faults import not_one_of
 from semgrid_eval.models.beside import Code, ModelFile, require_python
 from semgrid_eval.models.host import end_guests, known_answers, learn_answers
 from semgrid_eval.models.model import Model
@@ -127,6 +128,11 @@ def is_named(name: str) -> bool:
     return name in MODELS or ":" in name or name in installed_models()
 
 
+def model_names() -> list[str]:
+    """List the names of all built-in and installed models."""
+    return list(dict.fromkeys([*MODELS, *installed_models()]))
+
+
 def installed_models() -> dict[str, str]:
     """List the models that packages have registered: name -> package and version."""
     found = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
@@ -148,6 +154,5 @@ def _from_file(spec: str) -> tuple[ModelFile, type[Model]]:
 def _entry_point(name: str) -> importlib.metadata.EntryPoint:
     known = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
     if name not in known.names:
-        names = ", ".join(sorted(known.names)) or "none"
-        raise InputError(f"no model {name!r} is installed ({names} found); a file is given as path.py:Class")
+        raise InputError(not_one_of(name, [*model_names(), "path.py:Class"]), field="model")
     return known[name]

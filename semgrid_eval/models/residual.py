@@ -1,6 +1,7 @@
 """RN: a residual network that corrects, cell by cell, what a table says of the overlaid inputs (not in the paper)."""
 
 from itertools import pairwise
+from typing import Annotated
 
 import torch
 from pydantic import Field
@@ -23,6 +24,7 @@ from semgrid_eval.models.network import (
 from semgrid_eval.models.prior import CellPrior
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
+Width = Annotated[int, Field(ge=1, le=1024)]
 FOLD = 2  # cells along each axis that become channels of one place of the trunk
 LEAD_BINS = 12  # of the table, where the network is to answer any lead: .1 s each
 _STAY = 5.0  # what the shift mixture starts with for no displacement, beside 0 for all others
@@ -42,7 +44,7 @@ class ResidualSettings(NetworkSettings):
         augment=AugmentConfig(flip=0.5),
         calibrate=True,
     )
-    widths: tuple[int, ...] = Field((32, 64, 96, 128), min_length=1, max_length=6)  # channels, each at half the size
+    widths: tuple[Width, ...] = Field((32, 64, 96, 128), min_length=1, max_length=6)  # channels, each at half the size
     fine: int = Field(24, ge=0, le=256)  # channels at full resolution; 0 leaves that branch out
     prior: bool = True  # whether it adds to the table of `models.prior`
     shift: int = Field(0, ge=0, le=8)  # reach of the shift mixture, in places of the trunk; 0 leaves it out

@@ -42,7 +42,9 @@ class TownResidual(Model, torch.nn.Module):
             asked = f"{len(given.sensors)} sensors and {given.inputs} inputs"
             raise ConfigError(f"was trained on {_INPUTS} inputs of one sensor, not {asked}", field="model")
         if not given.translate:
-            raise ConfigError("was trained on inputs moved to the target's time", field="model")
+            raise ConfigError(
+                "was trained on inputs moved to the target's time, which translate: false leaves out", field="model"
+            )
         if abs(given.cell_m - CELL_M) > 0.01 * CELL_M:
             raise ConfigError(f"was trained on cells of {CELL_M:g} m, not {given.cell_m:g} m", field="model")
 

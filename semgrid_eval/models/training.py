@@ -127,7 +127,7 @@ class _Trainer:
             # Reading the loss waits for the device, so it is not done after each update.
             if done == last - first or time.monotonic() - said_s > _REPORT_INTERVAL_S:
                 loss = total.item() / done
-                self._check(loss, first + done)
+                self._check(loss, epoch)
                 message = f"epoch {epoch + 1}/{self._config.epochs} loss {loss:.4f}"
                 progress(first + done, self._config.updates_until(self._config.epochs), message)
                 said_s = time.monotonic()
@@ -159,10 +159,10 @@ class _Trainer:
                 total += self._loss(batch).item() * len(batch.target)
         return total / len(windows)
 
-    def _check(self, loss: float, update: int) -> None:
+    def _check(self, loss: float, epoch: int) -> None:
         if not math.isfinite(loss):
             raise DivergedError(
-                f"training diverged: the loss is {loss} after {update} updates; "
+                f"training diverged: the loss is not finite in epoch {epoch + 1}; "
                 f"try a learning_rate below {self._config.schedule.learning_rate:g} or set clip_norm"
             )
 

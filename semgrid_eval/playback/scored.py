@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import InputError, LogError, ResultError
+from semgrid_eval.faults import meant
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.scores import results
@@ -49,7 +50,8 @@ def find_row(record: results.RunRecord, name: str, run: Path) -> results.RowReco
     """Find a row of a run; an InputError says that there is none, or that it has no result."""
     row = next((row for row in record.rows if row.name == name), None)
     if row is None:
-        raise InputError(f"there is no row {name!r}, only {_listed([row.name for row in record.rows])}", path=run)
+        names = [row.name for row in record.rows]
+        raise InputError(f"there is no row {name!r}, only {_listed(names)}{meant(name, names)}", path=run)
     if not row.results:
         raise InputError(f"it has no result: {row.failure or results.NOT_RUN}", path=run, field=f"row {name}")
     return row

@@ -97,7 +97,7 @@ def _fault_of_pixels(data: bytes) -> str:
         pixels = stream.decompress(packed, total)
         more = stream.decompress(stream.unconsumed_tail, 1)
     except zlib.error as error:
-        return str(error)
+        return f"its pixels cannot be unpacked ({str(error).rpartition(': ')[2]})"
     if len(pixels) != total or more or not stream.eof:
         return "it has too few pixels" if len(pixels) < total else "its pixels do not end where they should"
     return "" if _filters(pixels, lines) <= _LAST_FILTER else "a line of pixels begins wrongly"

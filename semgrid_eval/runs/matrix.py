@@ -1,6 +1,8 @@
 """Experiment matrices: YAML files of rows, with defaults and axes, resolved into complete rows."""
 
 import itertools
+import math
+import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from importlib import resources
@@ -10,8 +12,10 @@ from typing import Any
 from pydantic import Field
 
 from semgrid_eval.config import Config, load_yaml, merged, parse_config
-from semgrid_eval.errors import ConfigError, InputError, did_you_mean
-from semgrid_eval.models.registry import is_named
+from semgrid_eval.errors import ConfigError, InputError
+from semgrid_eval.faults import meant, not_one_of, shown
+from semgrid_eval.models.beside import require_python
+from semgrid_eval.models.registry import is_named, model_names
 from semgrid_eval.runs.row import Row
 
 ROW_LIMIT = 10_000
@@ -29,6 +33,10 @@ class Matrix(Config):
 class _Axes(Config):
     grid: dict[str, list[Any]] = Field(default_factory=dict)
     zip: dict[str, list[Any]] = Field(default_factory=dict)
+
+
+class _WithAxes(Config):
+    axes: _Axes = _Axes()
 
 
 class _MatrixFile(Config):
@@ -59,8 +67,24 @@ def load_matrix(name_or_path: str, *, models: Sequence[str] = ()) -> Matrix:
         ConfigError: names file, row and key at fault.
     """
     file, path = _read(name_or_path)
+    for model in models:
+        _require_model(model)
     added = [{"name": model.rpartition(":")[2], "model": model} for model in models]
     return _resolve(file.model_copy(update={"rows": [*file.rows, *added]}), path)
+
+
+def _require_model(name: str) -> None:
+    """Refuse a model of a command line that cannot be there; one of a file is a row that fails when its turn comes."""
+    try:
+        if ":" in name:
+            file, _, cls = name.rpartition(":")
+            require_python(Path(file))
+            if not cls.isidentifier():
+                raise ConfigError(f"{cls!r} is not the name of a class; a model is given as path.py:Class", path=file)
+        elif name not in (known := model_names()):
+            raise ConfigError(f"{not_one_of(name, [*known, 'path.py:Class'])}")
+    except InputError as error:
+        raise ConfigError(str(error), field="--model") from None
 
 
 def _read(name: str, *above: Path) -> tuple[_MatrixFile, Path]:
@@ -83,10 +107,11 @@ def _load(name: str, *above: Path) -> tuple[Path, object]:
         with resources.as_file(resources.files("semgrid_eval.presets") / f"{name}.yaml") as place:
             return Path(f"preset {name}"), load_yaml(place)
     path = above[-1].parent / name if above else Path(name)
-    if path.is_file():
-        return path, load_yaml(path)
-    meant = did_you_mean(name, preset_names())
-    fault = f"is neither a file nor a preset ({', '.join(preset_names())}){meant}"
+    if os.path.lexists(path):  # what is no file is refused as such
+        value = load_yaml(path)
+        return path, {} if value is None else value
+    presets = preset_names()
+    fault = f"is neither a file nor a preset ({', '.join(presets)}){meant(name, presets)}"
     if above:
         raise ConfigError(f"{path} {fault}", path=above[-1], field="extends")
     raise ConfigError(fault, path=path)
@@ -96,9 +121,7 @@ def _extended(base: _MatrixFile, file: _MatrixFile, path: Path) -> _MatrixFile:
     names = [_written_name(row) for row in base.rows]
     for name in file.without:
         if name not in names:
-            raise ConfigError(
-                f"{name!r} is not a row of {file.extends}: {', '.join(names)}", path=path, field="without"
-            )
+            raise ConfigError(f"row {not_one_of(name, names)}", path=path, field="without")
     rows = [row for name, row in zip(names, base.rows, strict=True) if name not in file.without]
     unchanged = {_written_name(row): place for place, row in enumerate(rows)}
     for row in file.rows:
@@ -124,7 +147,7 @@ def _resolve(file: _MatrixFile, path: Path) -> Matrix:
         raise ConfigError("there is no row", path=path, field="rows")
     for model in file.models:
         if not is_named(model):
-            raise ConfigError("is not a model", path=path, field=f"models.{model}")
+            raise ConfigError(not_one_of(model, model_names()), path=path, field="models")
     name, count = Counter(row.name for row in rows).most_common(1)[0]
     if count > 1:
         raise ConfigError(f"{name!r} is the name of {count} rows", path=path, field="rows.name")
@@ -143,14 +166,14 @@ def _parsed(row: dict[str, Any], place: str) -> Row:
 def _expanded(file: _MatrixFile, path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
     """Merge defaults into each row, multiply it by its axes, and put its model's settings under its own."""
     number = 0
-    for row in file.rows:
-        place = f"row {row.get('name', '?')!r}"
+    for count, row in enumerate(file.rows, start=1):
+        place = f"row {row['name']!r}" if row.get("name") else f"row number {count}"
         whole = merged(file.defaults, row)
-        axes = parse_config(_Axes, whole.pop("axes", {}), path=f"{path}: {place}.axes")
+        axes = parse_config(_WithAxes, {"axes": whole.pop("axes", {})}, path=f"{path}: {place}").axes
+        number += math.prod(len(values) for values in axes.grid.values()) * max(map(len, axes.zip.values()), default=1)
+        if number > ROW_LIMIT:
+            raise ConfigError(f"give {number} rows, and {ROW_LIMIT} are allowed", path=path, field="axes")
         for values in _combinations(axes, f"{path}: {place}"):
-            number += 1
-            if number > ROW_LIMIT:
-                raise ConfigError(f"gives more than {ROW_LIMIT} rows", path=path, field="axes")
             filled = _fill(whole, values, f"{path}: {place}")
             yield place, _with_bases(filled, file.models)
 
@@ -169,7 +192,9 @@ def _with_bases(row: dict[str, Any], models: dict[str, dict[str, Any]]) -> dict[
 def _combinations(axes: _Axes, place: str) -> Iterator[dict[str, Any]]:
     lengths = {len(values) for values in axes.zip.values()}
     if len(lengths) > 1:
-        raise ConfigError(f"lists of {' and '.join(map(str, sorted(lengths)))} values", path=place, field="axes.zip")
+        raise ConfigError(
+            f"lists must be equally long, and have {shown(sorted(lengths))} values", path=place, field="axes.zip"
+        )
     together = [dict(zip(axes.zip, values, strict=True)) for values in zip(*axes.zip.values(), strict=True)] or [{}]
     for values in itertools.product(*axes.grid.values()):
         for zipped in together:
@@ -182,7 +207,9 @@ def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, 
         for part in reversed(key.split(".")):
             nested = {part: nested}
         row = merged(row, nested)
-    name = _written_name(row)
+    name = row.get("name")
+    if not isinstance(name, str):
+        return row
     for key, value in values.items():
         name = name.replace("{" + key + "}", str(value))
     if "{" in name:

@@ -8,11 +8,12 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from semgrid_eval.config import Config
 from semgrid_eval.errors import ConfigError, InputError
+from semgrid_eval.faults import not_one_of
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import Truth
 from semgrid_eval.models.model import AnswersIn, Given, Model
-from semgrid_eval.models.registry import MODELS, described, installed_models, is_named
+from semgrid_eval.models.registry import described, is_named, model_names
 from semgrid_eval.scores.evaluate import MaskMode
 from semgrid_eval.scores.facts import RowFacts, StreamFacts
 from semgrid_eval.streams.config import StreamConfig
@@ -75,12 +76,13 @@ class Row(Config):
     def _sound(self) -> Self:
         for sensor in self.sensors:
             if sensor not in self.grid.sensors:
-                raise ValueError(f"sensor {sensor!r} is not one of {', '.join(self.grid.sensors)}")
+                raise ValueError(f"sensors: {not_one_of(sensor, self.grid.sensors)}")
         if not is_named(self.model):
-            names = ", ".join(dict.fromkeys([*MODELS, *installed_models()]))
-            raise ValueError(f"model {self.model!r} is not one of {names} or path.py:Class")
+            raise ValueError(f"model: {not_one_of(self.model, [*model_names(), 'path.py:Class'])}")
         if self.scored_window.inputs != self.window.inputs:
-            raise ValueError(f"validation_window has {self.scored_window.inputs} inputs, window {self.window.inputs}")
+            raise ValueError(
+                f"validation_window.inputs: has {self.scored_window.inputs} inputs, window {self.window.inputs}"
+            )
         self._check_leads()
         self._check_disturb()
         self._check_stream()
@@ -92,10 +94,12 @@ class Row(Config):
         if self.train_leads is None:
             return
         if not 1 <= self.train_leads[0] <= self.train_leads[1]:
-            raise ValueError(f"train_leads {list(self.train_leads)} are not frames from and to")
+            raise ValueError(
+                f"train_leads: {list(self.train_leads)} is not a first and a last number of frames, from 1"
+            )
         reach, target = self.window.span_frames + self.train_leads[1], self.window.target_frame
         if target is not None and reach > target:
-            raise ValueError(f"train_leads reach back {reach} frames, and target_frame is {target}")
+            raise ValueError(f"train_leads: reach back {reach} frames, and target_frame is {target}")
 
     def _check_disturb(self) -> None:
         if self.disturb is None:

@@ -11,9 +11,10 @@ import torch
 
 from semgrid_eval.errors import ConfigError, SemgridError, first_line
 from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
+from semgrid_eval.faults import not_one_of
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import Question
-from semgrid_eval.models.device import choose_device, is_out_of_memory, settle_process
+from semgrid_eval.models.device import choose_device, is_out_of_memory, memory_words, settle_process
 from semgrid_eval.models.registry import MODELS, adopt, ways_of_own_models
 from semgrid_eval.places import remove_stale
 from semgrid_eval.progress import Progress, Stage, silent, silent_stage
@@ -127,8 +128,7 @@ def wanted_rows(matrix: Matrix, only: Sequence[str]) -> list[Row]:
     found = {each: [row for row in matrix.rows if row.name == each or fnmatchcase(row.name, each)] for each in only}
     for pattern, rows in found.items():
         if not rows:
-            names = ", ".join(sorted(row.name for row in matrix.rows))
-            raise ConfigError(f"{pattern!r} is not a row of this matrix: {names}", field="row")
+            raise ConfigError(not_one_of(pattern, sorted(row.name for row in matrix.rows)), field="row")
     return [row for row in matrix.rows if not only or any(row in rows for rows in found.values())]
 
 
@@ -211,7 +211,7 @@ def failure_of(error: Exception, row: Row) -> str | None:
     if isinstance(error, SemgridError):
         return str(error)
     if is_out_of_memory(error):
-        return f"out of memory: {first_line(error)}"
+        return memory_words(error)
     # What torch and its libraries raise, or code of one's own that they call.
     if isinstance(error, RuntimeError) or row.model not in MODELS:
         return f"{type(error).__name__}: {first_line(error)}"

@@ -37,7 +37,7 @@ class Wanted:
         for group in self.groups:
             if group not in groups:
                 found = ", ".join(sorted(set(groups))) or "none"
-                message = f"no recording of split {self.split!r} is of the group {group!r}, only {found}"
+                message = f"no recording of split {self.split!r} is of the group {group!r} (groups found: {found})"
                 raise InputError(message, field="hold_out")
         chosen = {index for index, group in enumerate(groups) if group in self.groups}
         return chosen if self.groups and self.held_out else set(range(len(groups))) - chosen

@@ -39,7 +39,7 @@ from semgrid_eval.streams.evaluate import Unseen, evaluate_stream
 from semgrid_eval.streams.plan import StreamPlan
 from semgrid_eval.windows.data import WindowSet, window_arrays
 from semgrid_eval.windows.grids import GridData
-from semgrid_eval.windows.plan import training_windows, validation_windows
+from semgrid_eval.windows.plan import TooEarlyError, training_windows, validation_windows
 
 _log = logging.getLogger(__name__)
 
@@ -197,6 +197,8 @@ class Worker:
         wanted = Wanted(row.scored_split, row.window, validation_windows, row.leads_frames, row.hold_out, held_out=True)
         try:
             return self._windows.select(self.training_data, row, wanted)[0]
+        except TooEarlyError:
+            raise
         except InputError:  # no such logs among them, and none is needed
             return None
 

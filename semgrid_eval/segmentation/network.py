@@ -1,6 +1,7 @@
 """A segmentation network in an ONNX file: checked when it is opened, then images in and label ids out."""
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +19,7 @@ from semgrid_eval.segmentation.config import SegmentationConfig
 Size = tuple[int, int]
 """Width and height in pixels."""
 _VOID = 255
+_OF_THE_RUNTIME = re.compile(r"\[ONNXRuntimeError\] : \d+ : \w+ : |Load model from .* failed: ?")
 _MESSAGE_CHARACTERS = 200
 Shape = Sequence[int | str | None]
 """Of a tensor; axes that the model leaves open have a name, or None."""
@@ -238,5 +240,5 @@ def _shown(shape: Shape) -> str:
 
 
 def _one_line(error: Exception) -> str:
-    text = " ".join(str(error).split())
+    text = _OF_THE_RUNTIME.sub("", " ".join(str(error).split())).partition(" Name:")[0]
     return text if len(text) <= _MESSAGE_CHARACTERS else f"{text[: _MESSAGE_CHARACTERS - 3]}..."

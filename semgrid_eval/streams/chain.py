@@ -75,7 +75,7 @@ def build_chain(logs: Sequence[Path], parts: Parts) -> Built:
         cv2.setNumThreads(parts.threads)
     device = choose_device(parts.device)
     if parts.processor_time and (device.type != "cpu" or parts.threads != 1):
-        raise ConfigError("is what a chain takes on one thread of a CPU alone: add threads 1", field="processor_time")
+        raise ConfigError("is what a chain takes on one thread of a CPU alone: add --threads 1", field="processor_time")
     made = models_for(parts.models, logs[0], device)
     segmentation = None
     if parts.segment is not None:

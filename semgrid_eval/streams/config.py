@@ -43,8 +43,10 @@ class StreamConfig(Config):
 
     @model_validator(mode="after")
     def _one_source_of_latency(self) -> Self:
-        if self.recorded + (self.latency_ms is not None) + (self.profile is not None) != 1:
-            raise ValueError("give one of latency_ms, profile and recorded: true")
+        sources = {"latency_ms": self.latency_ms is not None, "profile": self.profile is not None}
+        given = [name for name, is_given in {**sources, "recorded": self.recorded}.items() if is_given]
+        if len(given) != 1:
+            raise ValueError(f"give one of latency_ms, profile and recorded: true, not {' and '.join(given) or 'none'}")
         if self.recorded and (self.workers, self.rule, self.asked) != ("one", "newest", "capture"):
             raise ValueError("recorded: workers, rule and asked are of what is simulated, and nothing is")
         if self.profile is None and (self.scale != 1.0 or self.profile_model is not None):

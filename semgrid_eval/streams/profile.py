@@ -11,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError
+from semgrid_eval.faults import not_one_of
 from semgrid_eval.files import read_json, write_json
 
 STAGES = ("decode", "segment", "match", "grid", "align")
@@ -47,7 +48,7 @@ class LatencyProfile(Config):
     def _stages_are_known(cls, stages: dict[str, Samples]) -> dict[str, Samples]:
         for name in stages:
             if name not in STAGES:
-                raise ValueError(f"{name!r} is not one of the stages {', '.join(STAGES)}")
+                raise ValueError(not_one_of(name, STAGES))
         return stages
 
     @model_validator(mode="after")

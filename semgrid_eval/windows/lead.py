@@ -1,14 +1,18 @@
 """Leads in milliseconds: the best one that a report found for a latency, and the frames that a lead is."""
 
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError
+from semgrid_eval.faults import not_one_of
 from semgrid_eval.files import read_json
 
+LONGEST_LEAD_MS = 60_000
 _FROM = "from "
 _HEADLINE = "mean_known"
 
@@ -16,7 +20,7 @@ _HEADLINE = "mean_known"
 class BestLeads(Config):
     """The leads that give the highest streaming IoU, in ms, by the name of a category; a report writes them."""
 
-    lead_ms: dict[str, float]
+    lead_ms: dict[str, Annotated[float, Field(gt=0, le=LONGEST_LEAD_MS)]]
 
 
 def lead_from(value: object) -> object:
@@ -29,13 +33,15 @@ def lead_from(value: object) -> object:
     file, category = value.removeprefix(_FROM), ""
     if not Path(file).is_file():
         file, _, category = file.rpartition(":") if ":" in file else (file, "", "")
+    if not file:
+        raise ValueError(f"{value!r} names no file")
     try:
         found = parse_config(BestLeads, read_json(Path(file)), path=file).lead_ms
     except (InputError, OSError) as error:
         raise ValueError(str(error)) from None
     wanted = category or _HEADLINE
     if wanted not in found:
-        raise ValueError(f"{file} has no lead for {wanted!r}, only for {', '.join(found) or 'nothing'}")
+        raise ValueError(f"{file}: lead_ms: {not_one_of(wanted, found)}")
     return found[wanted]
 
 

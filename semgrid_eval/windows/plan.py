@@ -9,7 +9,11 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
-from semgrid_eval.windows.lead import lead_from
+from semgrid_eval.windows.lead import LONGEST_LEAD_MS, lead_from
+
+
+class TooEarlyError(InputError):
+    """The one target of a validation recording lies before what inputs and lead need."""
 
 
 class WindowConfig(Config):
@@ -20,7 +24,7 @@ class WindowConfig(Config):
     horizon_steps: int = Field(default=1, ge=1)
     # Time to the target, to the nearest frame, instead of whole steps; `from FILE` takes the best one of a report.
     lead_ms: Annotated[float, BeforeValidator(lead_from)] | None = Field(
-        None, gt=0, le=60_000, exclude_if=operator.not_
+        None, gt=0, le=LONGEST_LEAD_MS, exclude_if=operator.not_
     )
     target_frame: int | None = Field(default=25, ge=0)  # the one target of a validation recording; None takes every one
 
@@ -94,6 +98,7 @@ def validation_windows(
     of these leads after the other, of those that they are long enough for.
 
     Raises:
+        TooEarlyError: `target_frame` is not as far from a recording's beginning as inputs and lead reach.
         InputError: no recording is long enough.
     """
     leads, target = leads_frames or [config.lead_frames], config.target_frame
@@ -103,7 +108,10 @@ def validation_windows(
         return _every_target(frame_counts, config, turns, min(leads))
     if target < config.span_frames + max(leads):
         reach = config.span_frames + max(leads)
-        raise InputError(f"target_frame {target} is too early: inputs and lead reach back {reach} frames")
+        fault = (
+            f"{target} is too early: inputs and lead reach back {reach} frames; null takes every target that there is"
+        )
+        raise TooEarlyError(fault, field="window.target_frame")
     found = [
         Window(recording, config.input_frames(target, leads[recording % len(leads)]), target)
         for recording, count in enumerate(frame_counts)

@@ -154,7 +154,7 @@ def test_how_many_recordings_must_be_said(tmp_path, capsys):
     ("option", "message"),
     [
         (["--width", "1000000"], "Error: width: "),
-        (["--towns", "1"], "Error: (top level): training and validation need different towns"),
+        (["--towns", "1"], "Error: training and validation need different towns"),
         (["--duration-s", "0"], "Error: duration_s: "),
         (["--val-towns", "0"], "Error: val_towns: "),
     ],

@@ -72,7 +72,7 @@ def test_a_table_shows_stages_models_and_chains_with_their_shares():
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
-        (["--model", "fues"], "Error: no model 'fues' is installed"),
+        (["--model", "fues"], "Error: model: 'fues' is not one of"),
         (["--warm-up", "99"], "Error: warm_up: 99 leaves no frame to measure"),
         (["--device", "tpu"], "Error: device: there is no device 'tpu' on this machine"),
         (["--right", "nothing"], "Error: nothing/toy: is not a folder"),

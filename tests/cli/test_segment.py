@@ -62,8 +62,8 @@ def test_failed_log_gives_exit_code_1(place, capsys):
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        (("--std", 1, 0, 1), "Error: std.1: Input should be greater than 0 (found 0.0)\n"),
-        (("--size", 0, 8), "Error: size.0: Input should be greater than or equal to 1 (found 0)\n"),
+        (("--std", 1, 0, 1), "Error: std.1: must be above 0, not 0.0\n"),
+        (("--size", 0, 8), "Error: size.0: must be at least 1, not 0\n"),
         (("--output", "aux"), "Error: network.onnx: output: there is no aux; there are: answer\n"),
         (("--label-ids", "--out", "logs"), "Error: logs: out: contains or is inside logs; new logs need a folder"),
     ],

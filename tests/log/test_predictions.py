@@ -154,10 +154,10 @@ def test_a_record_that_names_no_recording_is_refused(tmp_path, record):
 
 def test_a_log_without_grids_and_a_message_that_is_none_are_refused(tmp_path):
     (tmp_path / "a.mcap").write_bytes(write(tmp_path / "b.mcap", []).read_bytes())
-    with pytest.raises(LogError, match=r"a.mcap: topic: holds semgrid.v1.SemanticGrid as nothing"):
+    with pytest.raises(LogError, match=r"a.mcap: topic: holds no semgrid.v1.SemanticGrid"):
         read(tmp_path / "a.mcap")
     path = write(tmp_path / "c.mcap", [(10**18, Timestamp(seconds=-1))])
-    with pytest.raises(LogError, match=r"holds semgrid.v1.SemanticGrid as nothing"):
+    with pytest.raises(LogError, match=r"holds no semgrid.v1.SemanticGrid"):
         read(path)
 
 

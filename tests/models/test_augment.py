@@ -162,7 +162,7 @@ def test_strengths_are_drawn_up_to_what_is_asked_for():
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ({"flip": 1.5}, r"augment.flip.*found 1\.5"),
+        ({"flip": 1.5}, r"augment.flip.*not 1\.5"),
         ({"rotate_deg": -1.0}, r"augment\.rotate_deg"),
         ({"misalign_cells": 0.5}, r"augment\.misalign_cells"),
         ({"scale": 2}, "unknown key; allowed here: flip, misalign_cells, rotate_deg"),

@@ -75,5 +75,8 @@ def test_fusing_lets_time_win_over_sensors():
 
 @pytest.mark.parametrize("sensors", [("full",), ("full", LOWER), (UPPER, UPPER)])
 def test_sensors_of_which_not_one_alone_is_on_top_are_refused(sensors):
-    with pytest.raises(ConfigError, match=rf"settings\.top: not one of {', '.join(sensors)} alone has 'upper'"):
+    with pytest.raises(
+        ConfigError,
+        match=rf"settings\.top: 'upper' must be part of the name of one sensor alone, of {', '.join(sensors)}",
+    ):
         OverlaySensors.check(OverlaySensors.Settings(), given_by(sensors=sensors))

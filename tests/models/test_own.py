@@ -141,7 +141,7 @@ def test_installed_entry_point_is_a_model(monkeypatch, batch):
     assert torch.equal(model.predict(batch).argmax(dim=1), batch.past[:, 0, -1].long())
     assert is_named("mine")
     assert version_of("mine") != version_of("newest")
-    with pytest.raises(InputError, match=r"no model 'yours' is installed \(mine found\)"):
+    with pytest.raises(InputError, match=r"model: 'yours' is not one of .*, mine, path.py:Class"):
         find_model("yours")
 
 
@@ -152,8 +152,8 @@ def test_installed_entry_point_is_a_model(monkeypatch, batch):
         ("constant", r"own_models\.py:constant: is not a class that has `Model` or `Network` as its base"),
         ("Alone", r"own_models\.py:Alone: is not a class that has `Model` or `Network` as its base"),
         ("Untyped", r"own_models\.py:Untyped: has `Settings` that do not have `Config` as their base"),
-        ("Listed", r"own_models\.py:Listed: files: is \['table\.txt'\], which is not of the type that it has to be"),
-        ("Maybe", r"own_models\.py:Maybe: baseline: is 'no', which is not of the type"),
+        ("Listed", r"own_models\.py:Listed: files: must be of type tuple \| None, not \['table\.txt'\]"),
+        ("Maybe", r"own_models\.py:Maybe: baseline: must be of type bool, not 'no'"),
         ("Untrained", r"own_models\.py:Untrained: has `Settings` that do not have `NetworkSettings` as their base"),
     ],
 )
@@ -199,7 +199,7 @@ def test_a_declared_file_that_is_missing_is_named_and_another_is_another_version
 def test_file_that_is_missing_or_no_python_is_named(tmp_path):
     broken = tmp_path / "broken.py"
     broken.write_text("def half(")
-    with pytest.raises(InputError, match=r"none\.py: is not a Python file"):
+    with pytest.raises(InputError, match=r"none\.py: is not there"):
         find_model(f"{tmp_path / 'none.py'}:Model")
     with pytest.raises(InputError, match=r"broken\.py: raised SyntaxError"):
         find_model(f"{broken}:Model")
@@ -233,7 +233,7 @@ def guarded(tmp_path, base, answer):
 @pytest.mark.parametrize(
     ("answer", "message"),
     [
-        (lambda batch: 3, "gave a int where a tensor is needed"),
+        (lambda batch: 3, "gave int where a tensor is needed"),
         (lambda batch: torch.zeros(2, 8, 16, 16), r"scores 8 classes, and person, bicycle are missing"),
         (lambda batch: torch.zeros(2, 10, 16, 8), r"gave shape \(2, 10, 16, 8\) where \(2, 10, 16, 16\) is needed"),
         (lambda batch: torch.zeros(10, 16, 16), r"gave shape \(10, 16, 16\)"),

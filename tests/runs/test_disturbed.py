@@ -127,12 +127,12 @@ rows:
 @pytest.mark.parametrize(
     ("disturb", "message"),
     [
-        ("{kind: fog}", "disturb: kind 'fog' is not one of lost_frame, mislabelled"),
-        ("{strength: 1}", "disturb: kind None is not one of"),
-        ("{kind: late_input, delay: 3}", "disturb: unknown key 'delay'; allowed here: kind, seed, strength"),
-        ("{kind: late_input, strength: 0.5}", r"disturb\.strength: .*found 0\.5"),
-        ("{kind: mislabelled, strength: 2}", r"disturb\.strength: .*found 2"),
-        ("{kind: lost_frame, which: middle}", r"disturb\.which: .*found 'middle'"),
+        ("{kind: fog}", "disturb: kind: 'fog' is not one of lost_frame, mislabelled"),
+        ("{strength: 1}", "disturb: kind: is missing; it is one of"),
+        ("{kind: late_input, delay: 3}", "disturb: delay: unknown key; allowed here: kind, seed, strength"),
+        ("{kind: late_input, strength: 0.5}", r"disturb\.strength: .*not 0\.5"),
+        ("{kind: mislabelled, strength: 2}", r"disturb\.strength: .*not 2"),
+        ("{kind: lost_frame, which: middle}", r"disturb\.which: 'middle' is not one of"),
     ],
 )
 def test_faults_name_the_row_and_the_key(tmp_path, disturb, message):

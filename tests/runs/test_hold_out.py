@@ -50,7 +50,7 @@ def test_a_group_that_no_recording_has_fails_the_row_alone(logs, tmp_path):
     rows = [{"name": "wrong", "model": "newest", "hold_out": ["d"]}, {"name": "BL", "model": "newest"}]
     wrong, right = run(rows, logs, tmp_path / "run").rows
     assert wrong.failure is not None
-    assert "no recording of split 'train' is of the group 'd', only a, b" in wrong.failure
+    assert "no recording of split 'train' is of the group 'd' (groups found: a, b)" in wrong.failure
     assert right.failure is None
 
 
@@ -76,5 +76,5 @@ def test_rows_that_differ_in_the_horizon_share_a_training_of_mixed_leads(logs, t
 
 def test_leads_that_reach_before_the_recording_are_refused(logs, tmp_path):
     rows = [{"name": "RN", "model": "residual", "train_leads": [1, 9]}]
-    with pytest.raises(Exception, match="train_leads reach back 12 frames, and target_frame is 8"):
+    with pytest.raises(Exception, match="train_leads: reach back 12 frames, and target_frame is 8"):
         run(rows, logs, tmp_path / "run")

@@ -2,6 +2,7 @@ import csv
 import importlib.metadata
 import os
 from importlib import resources
+from pathlib import Path
 
 import pytest
 import yaml
@@ -83,64 +84,11 @@ def test_rows_override_defaults_key_by_key(tmp_path):
     assert row.label == "a (newest input, moved to the target's time, 2 inputs, 2 steps of 3 frames ahead)"
 
 
-@pytest.mark.parametrize(
-    ("rows", "message"),
-    [
-        (
-            [{"name": "a", "model": "ed", "setings": {}}],
-            r"m\.yaml: row 'a': setings: unknown key; .*settings",
-        ),
-        (
-            [{"name": "a", "model": "ed", "settings": {"debth": 3}}],
-            r"m\.yaml: row 'a': settings\.debth: unknown key; allowed here: constants, .*depth",
-        ),
-        (
-            [{"name": "a", "model": "ed", "settings": {"training": {"schedule": {"rate": 3}}}}],
-            r"settings\.training\.schedule\.rate: unknown key; allowed here: drop_epoch, learning_rate,",
-        ),
-        (
-            [{"name": "a", "model": "ed", "settings": {"training": {"batch": 0}}}],
-            r"settings\.training\.batch: .*\(found 0",
-        ),
-        ([{"name": "a", "model": "ed", "settings": 3}], "row 'a': settings: Input should be an object"),
-        ([{"name": "a", "model": "newest", "settings": {"x": 3}}], r"settings\.x: unknown key; allowed here: none$"),
-        (
-            [{"name": "a", "model": "ed", "settings": {"depth": 6}, "grid": {"spec": {"columns": 80}}}],
-            r"row 'a': settings: depth 6 needs grids of a multiple of 32 cells, not 128 x 80",
-        ),
-        ([{"name": "a", "model": "de"}], "row 'a': .*'de' is not one of ed, residual, residual-town, newest"),
-        ([{"name": "a", "model": "ed", "sensors": ["left"]}], "row 'a': .*'left' is not one of full, split1_upper"),
-        ([{"name": "a", "model": "overlay"}], "settings.top: not one of .* alone has 'upper'"),
-        (
-            [{"name": "a", "model": "overlay", "sensors": ["full", "split1_lower"]}],
-            "settings.top: not one of .* alone has 'upper'",
-        ),
-        (
-            [{"name": "a", "model": "overlay", "sensors": ["split1_upper"] * 2}],
-            "settings.top: not one of .* alone has 'upper'",
-        ),
-        ([{"name": "a", "model": "newest", "grid": {"class_map": {"car": "roadd"}}}], "row 'a': grid.*'roadd' is not"),
-        (
-            [{"name": "a", "model": "newest", "grid": {"spec": {"agent_row": 10**22}}}],
-            "row 'a': grid.spec: the agent's cell 1000",
-        ),
-        (
-            [{"name": "a", "model": "newest", "grid": {"spec": {"agent_column": 300}}}],
-            "agent's cell 128, 300 is outside",
-        ),
-        ([{"name": "a", "model": "ed"}, {"name": "a", "model": "newest"}], "rows.name: 'a' is the name of 2 rows"),
-        ([{"name": "a{settings.depth}", "model": "ed"}], "has a place that no axis fills"),
-        ([{"name": "a", "model": "ed", "axes": {"zip": {"x": [1], "y": [1, 2]}}}], "lists of 1 and 2 values"),
-        ([{"name": "a", "model": "ed", "window": {"inputs": 9}}], "target_frame 25 is too early"),
-        ([], "rows: there is no row"),
-    ],
-)
-def test_faults_name_file_row_and_key(tmp_path, rows, message):
-    with pytest.raises(ConfigError, match=message):
-        load(tmp_path, {"rows": rows})
-
-
-def test_models_of_ones_own_are_rows_with_the_matrix_s_defaults(tmp_path):
+def test_models_of_ones_own_are_rows_with_the_matrix_s_defaults(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lib").mkdir()
+    for file in ("mine.py", "lib/mine.py"):
+        Path(file).touch()
     write(tmp_path, mine={"defaults": {"mask_mode": "off"}, "rows": [{"name": "a", "model": "newest"}]})
     rows = load_matrix(str(tmp_path / "mine.yaml"), models=["lib/mine.py:Mine", "mine.py:Other"]).rows
     assert [(row.name, row.model, row.facts.family, row.mask_mode) for row in rows[1:]] == [
@@ -159,16 +107,17 @@ def test_an_installed_model_is_a_row_and_is_looked_for_only_where_one_is_asked_f
         return importlib.metadata.EntryPoints([importlib.metadata.EntryPoint("mine", "package:Mine", group)])
 
     monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
-    load_matrix("paper", models=["mine.py:Mine"])
+    (tmp_path / "mine.py").touch()
+    load_matrix("paper", models=[f"{tmp_path}/mine.py:Mine"])
     assert looked_for == []
     assert load(tmp_path, {"rows": [{"name": "a", "model": "mine"}]}).rows[0].model == "mine"
     assert set(looked_for) == {ENTRY_POINT_GROUP}
-    with pytest.raises(ConfigError, match=r"'yours' is not one of ed, .*, mine or path\.py:Class"):
+    with pytest.raises(ConfigError, match=r"'yours' is not one of ed, .*, mine, path\.py:Class"):
         load(tmp_path, {"rows": [{"name": "a", "model": "yours"}]})
 
 
 def test_a_name_that_is_neither_file_nor_preset_lists_the_presets():
-    with pytest.raises(ConfigError, match=r"papre: is neither a file nor a preset \(.*\); did you mean 'paper'\?$"):
+    with pytest.raises(ConfigError, match=r"papre: is neither a file nor a preset \(.*\); did you mean paper\?$"):
         load_matrix("papre")
 
 
@@ -283,14 +232,14 @@ def test_a_validation_window_is_as_the_window_where_it_says_nothing(tmp_path):
             {"extends": "good.yaml", "rows": [{"name": "a", "setings": {}}]},
             r"mine\.yaml: row 'a': setings: unknown key",
         ),
-        ({"extends": "good.yaml", "without": ["b"]}, r"mine\.yaml: without: 'b' is not a row of good\.yaml: a$"),
+        ({"extends": "good.yaml", "without": ["b"]}, r"mine\.yaml: without: row 'b' is not a, the only choice$"),
         ({"extends": "good.yaml", "without": ["a"]}, r"mine\.yaml: rows: there is no row"),
         (
             {"extends": "good.yaml", "rows": [{"name": "a"}, {"name": "a"}]},
-            r"mine\.yaml: row 'a': model: Field required",
+            r"mine\.yaml: row 'a': model: is missing",
         ),
         ({"extends": "good.yaml", "rows": [{"name": "a"}, {"name": "a", "model": "ed"}]}, "'a' is the name of 2 rows"),
-        ({"extends": 3}, r"mine\.yaml: extends: .*string"),
+        ({"extends": 3}, r"mine\.yaml: extends: must be text"),
         ({"without": ["a"], "rows": [{"name": "a", "model": "ed"}]}, "without: .* there is no `extends`"),
         (
             {"extend": "paper"},
@@ -319,7 +268,7 @@ def test_settings_of_a_model_lie_under_those_of_its_rows_alone(tmp_path):
 
 
 def test_settings_of_what_is_no_model_are_an_error(tmp_path):
-    with pytest.raises(ConfigError, match=r"m\.yaml: models\.edd: is not a model"):
+    with pytest.raises(ConfigError, match=r"m\.yaml: models: 'edd' is not one of ed, .*did you mean ed\?"):
         load(tmp_path, {"models": {"edd": {}}, "rows": [{"name": "a", "model": "newest"}]})
 
 
@@ -400,7 +349,7 @@ def test_a_row_without_sensors_sees_those_of_its_target(tmp_path):
     )
     assert [row.sensors for row in load_matrix(str(file)).rows] == [("full",), ("right", "left")]
     file.write_text("rows: [{name: plain, model: newest, grid: {sensors: {a: {}}}}]")
-    with pytest.raises(ConfigError, match="grid: target: 'full' is not one of the sensors a"):
+    with pytest.raises(ConfigError, match="grid: target: 'full' is not a, the only choice"):
         load_matrix(str(file))
 
 
@@ -416,7 +365,7 @@ def test_a_seed_that_no_generator_takes_is_one_line(tmp_path, seed):
 def test_a_batch_beyond_all_memory_is_one_line(tmp_path):
     rows = [{"name": "a", "model": "ed", "settings": {"training": {"batch": 10**9}}}]
     (tmp_path / "m.yaml").write_text(yaml.safe_dump({"rows": rows}))
-    with pytest.raises(ConfigError, match=r"settings\.training\.batch: Input should be less than or equal to 65536"):
+    with pytest.raises(ConfigError, match=r"settings\.training\.batch: must be at most 65536, not 1000000000"):
         load_matrix(str(tmp_path / "m.yaml"))
 
 

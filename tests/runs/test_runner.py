@@ -118,7 +118,7 @@ def test_a_row_that_fails_is_noted_and_the_others_go_on(logs, tmp_path):
     reasons = {row.name: row.failure for row in record.rows}
     assert "9" in reasons["ED-far"]
     assert reasons["BL-none"] == "no recording of split 'test' gave grids (splits found: train, val)"
-    assert re.search(r"missing\.py: is not a Python file", reasons["own"])
+    assert re.search(r"missing\.py: is not there", reasons["own"])
     assert reasons["BL-DC"] is None
     assert results.read_run(tmp_path / "run") == record
 
@@ -282,5 +282,5 @@ def test_one_row_alone_can_be_run_and_the_others_keep_what_they_have(logs, tmp_p
     assert second.rows[0].results == first.rows[0].results
     third = run(rows, logs, tmp_path / "third", only=("BL-*", "BL-DC"))
     assert [row.failure for row in third.rows] == [None, None, "not run yet"]
-    with pytest.raises(ConfigError, match=r"row: 'BL-Fus' is not a row of this matrix: BL-DC, BL-Fuse, ED"):
+    with pytest.raises(ConfigError, match=r"row: 'BL-Fus' is not one of BL-DC, BL-Fuse, ED; did you mean BL-Fuse"):
         run(rows, logs, out, only=("BL-Fus",))

@@ -69,5 +69,5 @@ def test_it_can_make_the_target_of_a_log_and_its_settings_are_strict(tmp_path):
     assert recording.stamps_ns[0] == START_NS - 20_000_000
     assert config.camera is None
     assert parse_config(GridConfig, config.model_dump(mode="json")) == config
-    with pytest.raises(ConfigError, match="unknown key 'top_px'; allowed here: ahead_m, kind, max_age_s"):
+    with pytest.raises(ConfigError, match="top_px: unknown key; allowed here: ahead_m, kind, max_age_s"):
         parse_config(GridConfig, {"sensors": {"full": {"kind": "radar", "top_px": 3}}})

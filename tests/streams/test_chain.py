@@ -174,7 +174,7 @@ def test_models_have_weights_or_get_some(log):
 def test_models_that_know_the_truth_or_do_not_exist_are_refused(log):
     with pytest.raises(InputError, match="model ceiling: is told the truth, which no vehicle has"):
         models_for(("ceiling",), log, CPU)
-    with pytest.raises(InputError, match="no model 'fues'"):
+    with pytest.raises(InputError, match=r"model: 'fues' is not one of .*did you mean fuse"):
         models_for(("fues",), log, CPU)
 
 

@@ -89,16 +89,16 @@ def test_a_scale_multiplies_what_is_drawn(profile):
 @pytest.mark.parametrize(
     ("inside", "change", "fault"),
     [
-        (["stages"], {"grid": []}, r"stages\.grid: .*at least 1 item.*\(found \[\]\)"),
-        (["stages"], {"grid": [1.0, -2.5, 3.0]}, r"stages\.grid\.1: .*greater than or equal to 0 \(found -2\.5\)"),
-        (["models"], {"fuse": [1.0, 2.0, float("nan")]}, r"models\.fuse\.2: .*finite.*\(found nan\)"),
-        (["models"], {"fuse": [float("inf"), 2.0, 3.0]}, r"models\.fuse\.0: .*finite.*\(found inf\)"),
-        (["models"], {"fuse": ["4", 2.0, 3.0]}, r"models\.fuse\.0: .*\(found '4'\)"),
+        (["stages"], {"grid": []}, r"stages\.grid: must not be empty"),
+        (["stages"], {"grid": [1.0, -2.5, 3.0]}, r"stages\.grid\.1: must be at least 0, not -2\.5"),
+        (["models"], {"fuse": [1.0, 2.0, float("nan")]}, r"models\.fuse\.2: .*finite.*not NaN"),
+        (["models"], {"fuse": [float("inf"), 2.0, 3.0]}, r"models\.fuse\.0: .*finite.*not Infinity"),
+        (["models"], {"fuse": ["4", 2.0, 3.0]}, r"models\.fuse\.0: .*, not '4'"),
         (["models"], {"fuse": [1.0, 2.0]}, r"models\.fuse has 2 samples, and stages\.decode has 3"),
         (["stages"], {"grid": [1.0, 2.0]}, r"stages\.grid has 2 samples, and stages\.decode has 3"),
-        (["stages"], {"gird": [1.0, 2.0, 3.0]}, r"'gird' is not one of the stages decode, segment, match, grid, align"),
-        ([], {"stages": {}}, r"stages: .*at least 1"),
-        ([], {"format": 2}, r"format: .*\(found 2\)"),
+        (["stages"], {"gird": [1.0, 2.0, 3.0]}, r"'gird' is not one of decode, segment, match, grid, align"),
+        ([], {"stages": {}}, r"stages: must not be empty"),
+        ([], {"format": 2}, r"format: 2 is not 1"),
         ([], {"when": "today"}, r"when: unknown key; allowed here: format, made_by, models, stages"),
         (["made_by"], {"date": "today"}, r"made_by\.date: unknown key; allowed here: command, machine, version"),
     ],
@@ -117,7 +117,7 @@ def test_what_is_no_json_or_too_large_is_refused(tmp_path, monkeypatch):
         read_profile(file)
     monkeypatch.setattr("semgrid_eval.streams.profile._LIMIT_BYTES", 1 << 20)
     file.write_bytes(b" " * ((1 << 20) + 1))
-    with pytest.raises(InputError, match="1 MiB, and 1 are allowed"):
+    with pytest.raises(InputError, match="has 1048577 bytes, and 1048576 are allowed"):
         read_profile(file)
     with pytest.raises(InputError, match="cannot be read"):
         read_profile(tmp_path / "missing.json")

@@ -31,9 +31,9 @@ def test_the_lead_of_the_mean_or_of_a_category_is_taken_from_a_file(file):
     [
         (None, "", "leads.json"),
         ("{}", "", "lead_ms"),
-        ('{"lead_ms": {"vehicles": 1.0}}', "", "has no lead for 'mean_known', only for vehicles"),
-        ('{"lead_ms": {}}', ":person", "has no lead for 'person', only for nothing"),
-        ('{"lead_ms": {"mean_known": -1.0}}', "", "greater than 0"),
+        ('{"lead_ms": {"vehicles": 1.0}}', "", "lead_ms: 'mean_known' is not vehicles, the only choice"),
+        ('{"lead_ms": {}}', ":person", "lead_ms: 'person' is not one of"),
+        ('{"lead_ms": {"mean_known": -1.0}}', "", "must be above 0"),
     ],
 )
 def test_what_cannot_be_read_is_told_with_the_file(tmp_path, content, asked, fault):

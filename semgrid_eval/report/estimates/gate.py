@@ -6,7 +6,8 @@ from fnmatch import fnmatchcase
 from math import isfinite, nan
 from pathlib import Path
 
-from semgrid_eval.errors import InputError, did_you_mean
+from semgrid_eval.errors import InputError
+from semgrid_eval.faults import meant, not_one_of
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.report.estimates.bootstrap import LABELS, SEED, Estimate, Level, Resampling, Scores, score_regions
 from semgrid_eval.report.estimates.division import EVERYWHERE
@@ -58,7 +59,7 @@ def parse_limit(text: str) -> Limit:
     if not isfinite(least):
         raise InputError(f"{text!r} is not of the form 'vehicles: -0.01'", field=OPTION)
     if column not in LABELS:
-        raise InputError(f"{column!r} is not one of {', '.join(LABELS)}{did_you_mean(column, LABELS)}", field=OPTION)
+        raise InputError(not_one_of(column, LABELS), field=OPTION)
     if not -1.0 <= least <= 0.0:
         raise InputError(f"{text!r}: what may be lost of an IoU is a number from -1 to 0", field=OPTION)
     return Limit(column, least)
@@ -145,9 +146,7 @@ def _named(asked: str, before: Run, after: Run) -> list[tuple[str, str]]:
     found = exact[:1] or [(name, name) for name in ours if name in theirs and fnmatchcase(name, asked)]
     if not found:
         shared = [name for name in ours if name in theirs]
-        raise InputError(
-            f"{asked!r} is not a row of both runs: {', '.join(shared)}{did_you_mean(asked, shared)}", field="row"
-        )
+        raise InputError(f"{asked!r} is not a row of both runs: {', '.join(shared)}{meant(asked, shared)}", field="row")
     return found
 
 

@@ -3,7 +3,6 @@
 What is missing, broken or impossible in one is an InputError that names the file and, where there is one, the field.
 """
 
-import json
 import math
 from dataclasses import fields
 from pathlib import Path
@@ -13,7 +12,8 @@ import numpy as np
 
 from semgrid_eval.classes import CITYSCAPES_LABELS, label_ids_from_train_ids
 from semgrid_eval.errors import InputError
-from semgrid_eval.files import read_bytes
+from semgrid_eval.faults import shown
+from semgrid_eval.files import read_bytes, read_json
 from semgrid_eval.motion import implausible
 from semgrid_eval.recording.png import GRAY, PALETTE, PngHeader, decode_ids, encode_gray, require_pixels
 from semgrid_eval.recording.types import CameraCalibration, MotionSample
@@ -95,10 +95,9 @@ def read_label(path: Path, *, train_ids: bool) -> tuple[bytes, PngHeader]:
 
 
 def _read_object(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(read_file(path))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"is not valid JSON: {error}", path=path) from error
+    if not path.exists():
+        raise InputError("is missing", path=path)
+    content = read_json(path, limit=MAX_FILE_BYTES)
     if not isinstance(content, dict):
         raise InputError("is not a JSON object", path=path)
     return content
@@ -113,7 +112,7 @@ def _number(content: dict[str, Any], path: Path, *place: str) -> float:
             raise InputError("is missing", path=path, field=field)
         value = value[key]
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InputError(f"{str(value)[:40]!r} is not a number", path=path, field=field)
+        raise InputError(f"{shown(value)} is not a number", path=path, field=field)
     try:
         number = float(value)
     except OverflowError:

@@ -26,6 +26,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.faults import not_one_of
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.sources.cityscapes.sequence import CityscapesSequence, SequenceFrame, frame_name, sibling
 from semgrid_eval.sources.cityscapes.source import CityscapesOptions
@@ -44,7 +45,7 @@ def find_sequences(options: CityscapesOptions) -> list[CityscapesSequence]:
             ids, or the camera cannot be called so.
     """
     if not _CAMERA_NAME.fullmatch(options.camera_name):
-        raise InputError(f"{options.camera_name!r} is not a name of letters, digits, _ and -", field="camera name")
+        raise InputError(f"{options.camera_name!r} is not a name of letters, digits, _ and -", field="camera_name")
     root, labels = options.src / _IMAGES, options.labels
     if not root.is_dir():
         raise InputError("is not a folder; a Cityscapes sequence tree has one", path=root)
@@ -64,7 +65,7 @@ def _splits(root: Path, wanted: Collection[str]) -> list[str]:
     there = sorted(path.name for path in root.iterdir() if path.is_dir())
     for split in wanted:
         if split not in there:
-            raise InputError(f"is not a split of this tree; it has: {', '.join(there)}", path=root, field=split)
+            raise InputError(f"split {not_one_of(split, there)}", path=root)
     return sorted(set(wanted)) or there
 
 

@@ -81,9 +81,7 @@ def test_rows_are_chosen_by_name_by_pattern_or_as_pairs(runs):
     assert compared("bad", "ED-DC") == ["ED-DC"]
     assert compared("bad", "*-DC", "BL-DC") == ["BL-DC", "ED-DC"]
     assert compared("renamed", "ED-DC=ED-new") == ["ED-new"]
-    with pytest.raises(
-        InputError, match=r"row: 'ED-DD' is not a row of both runs: BL-DC, ED-DC; did you mean 'ED-DC'\?"
-    ):
+    with pytest.raises(InputError, match=r"row: 'ED-DD' is not a row of both runs: BL-DC, ED-DC; did you mean ED-DC\?"):
         gate(runs, "good", "bad", rows=("ED-DD",))
 
 
@@ -152,7 +150,7 @@ def test_limits_are_a_column_and_what_it_may_lose(text, limit):
         ("vehicles", "'vehicles' is not of the form 'vehicles: -0.01'"),
         ("vehicles: much", "'vehicles: much' is not of the form"),
         ("vehicles: nan", "'vehicles: nan' is not of the form"),
-        ("vehicle: -0.01", "'vehicle' is not one of unknown, road, .*; did you mean 'vehicles'?"),
+        ("vehicle: -0.01", "'vehicle' is not one of unknown, road, .*; did you mean vehicles?"),
         ("vehicles: 0.01", "'vehicles: 0.01': what may be lost of an IoU is a number from -1 to 0"),
         ("vehicles: -5", "'vehicles: -5': what may be lost"),
     ],

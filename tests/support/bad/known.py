@@ -1,0 +1,26 @@
+"""All kinds of bad inputs."""
+
+from support.bad import (
+    cityscapes,
+    commands,
+    containers,
+    contracts,
+    latencies,
+    logs,
+    matrices,
+    networks,
+    on_logs,
+    own_models,
+    predictions,
+    results,
+    surroundings,
+    yaml_files,
+)
+
+KINDS = (
+    *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, matrices.STREAM, on_logs.KIND),
+    *latencies.KINDS,
+    *(own_models.MODEL, predictions.KIND, contracts.CONTRACT),
+    *cityscapes.KINDS,
+    *(logs.KIND, containers.KIND, networks.KIND, results.KIND, commands.KIND, surroundings.KIND),
+)
