@@ -1,7 +1,9 @@
 """The page that says which line each bad input gets."""
 
 import re
+import sys
 from collections.abc import Iterator, Mapping
+from importlib.metadata import version
 from pathlib import Path
 
 from support.bad.case import Bad, Kind
@@ -21,13 +23,20 @@ PYTHONPATH=.:tests python tools/bad_inputs.py
 `Error: ` before each line is left out, as is `Usage: ...` where the command line itself is at fault. `...` stands for
 the rest of a long list, `(digest)` for 16 hexadecimal digits, `(gone)` for a field that is left out. Where a row of a
 matrix or a recording is at fault the others go on, and the exit code is 1. `check` prints a line for each finding; the
-first error is shown.
+first error is shown. Some lines quote Python or a library: these are of {versions}; with others, the suite compares
+all but the words.
 """
 
 
 def page_text(lines: Mapping[tuple[str, str], str], kinds: tuple[Kind, ...]) -> str:
     """Write the page; `lines` are by kind and words."""
-    return "\n".join([_HEAD.format(count=len(lines)), *_sections(lines, kinds)])
+    return "\n".join([_HEAD.format(count=len(lines), versions=versions()), *_sections(lines, kinds)])
+
+
+def versions() -> str:
+    """Say which versions of what is quoted are installed here."""
+    quoted = (f"{name} {version(name)}" for name in ("click", "onnxruntime", "PyYAML", "pydantic"))
+    return f"Python {sys.version_info[0]}.{sys.version_info[1]}, {', '.join(quoted)}"
 
 
 def _sections(lines: Mapping[tuple[str, str], str], kinds: tuple[Kind, ...]) -> Iterator[str]:
