@@ -1,0 +1,175 @@
+"""The head of a page: who wins, by how much and how sure, in a few sentences and large figures."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+from markupsafe import Markup
+
+from semgrid_eval.errors import printable
+from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, Scores
+from semgrid_eval.report.page.material import Material
+from semgrid_eval.report.rows.load import Row, Run, key_of
+from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, Headline, verdict
+from semgrid_eval.report.rows.words import otherwise_asked, question_words
+from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, plural, signed
+from semgrid_eval.report.tables.streams import stream_sentence
+from semgrid_eval.report.tables.targets import not_compared_sentence
+from semgrid_eval.report.tables.truth import way_sentence
+
+_FEW_RECORDINGS, _FEW_SEEDS = 10, 5
+_WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One difference, large: its label, the value, its interval and where they lie on a common axis (percent)."""
+
+    label: str
+    value: str
+    note: str
+    tone: str
+    word: str
+    title: str  # what stands behind it
+    at: float = 50.0
+    low: float = 50.0
+    high: float = 50.0
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The head of a page: sentences, and tiles with what they compare."""
+
+    sentences: tuple[str, ...]
+    compared: str
+    tiles: tuple[Tile, ...]
+
+
+def summarise(material: Material, found: Headline | None) -> Summary:
+    """Put a report into a few sentences."""
+    scores, evidence = material.scores, _evidence(material.runs, material.scores)
+    if found is None:
+        return Summary(("No row has a score: nothing can be compared.", evidence), "", ())
+    more = (
+        stream_sentence(material.streams),
+        way_sentence(scores, found.best),
+        not_compared_sentence([entry.row for entry in scores.values()]),
+        evidence,
+    )
+    sentences = tuple(filter(None, (_like_for_like(scores, found), _of_all(scores, found), *more)))
+    if (pair := _pair(found)) is None:
+        return Summary(sentences, "", ())
+    return Summary(sentences, f"{pair[0].name} {MINUS} {pair[1].name}", _tiles(scores, *pair))
+
+
+def _like_for_like(scores: Scores, found: Headline) -> Markup:
+    best = scores[found.best.name]
+    several = found.compared < found.sharing
+    asked = f"Like for like ({question_words(found.best, found.best)}; {plural(found.compared, 'row')}), " * several
+    start = _say("{}{} has the highest mean class IoU, {}", asked, _name(found.best), number(best.mean[HEADLINE]))
+    if found.rival is None:
+        return start + _say(" ({}); there is no other row to compare with.", interval_phrase(best.estimate(HEADLINE)))
+    lead = best.minus(scores[found.rival.name], HEADLINE)
+    over = f"{found.rival.name}, {_kind(found.best, found.rival)}"
+    return start + _say(": {} over {}, {}.", signed(lead.value), over, _verdict(lead))
+
+
+def _of_all(scores: Scores, found: Headline) -> Markup | str:
+    """Say which row is the best of all with the same targets, and what it is asked that the other one is not."""
+    if found.sharing == found.compared:
+        return ""
+    if found.overall == found.best:
+        return f"It is also the best of all {found.sharing} rows with these targets."
+    overall = scores[found.overall.name]
+    lead = overall.minus(scores[found.best.name], HEADLINE)
+    start = _say("Of all {} rows with these targets, {} is best, ", found.sharing, _name(found.overall))
+    value = f"{number(overall.mean[HEADLINE])}: {signed(lead.value)} over {found.best.name}, {_verdict(lead)}."
+    why = f" It is not asked the same: {otherwise_asked(found.overall, found.best)}."
+    return start + _say("{}{}", value, why)
+
+
+def _say(text: str, *parts: object) -> Markup:
+    """Fill in parts, escaped, what cannot be printed in them, too."""
+    shown = (part if isinstance(part, Markup) else printable(str(part)) for part in parts)
+    return Markup(text).format(*shown)
+
+
+def _name(row: Row) -> Markup:
+    return _say("<strong>{}</strong>", row.name)
+
+
+def _verdict(difference: Estimate) -> str:
+    return f"{_WORDS[verdict(difference)]} ({interval_phrase(difference, with_sign=True)})"
+
+
+def _evidence(runs: Sequence[Run], scores: Scores) -> str:
+    rows = [entry.row for entry in scores.values()]
+    records = [window for row in rows for result in row.results for window in result.record.windows]
+    windows = len(set(map(key_of, records)))
+    recordings = len({window.drive for window in records})
+    text = f"This rests on {plural(windows, 'window')} from {plural(recordings, 'recording')}"
+    seeds = [len(row.results) for row in rows if row.results[0].record.seed is not None]
+    if seeds:
+        span = plural(max(seeds), "seed") if min(seeds) == max(seeds) else f"{min(seeds)} to {max(seeds)} seeds"
+        text += f" and {span} for each trained row"
+    failed = sum(bool(row.failures) for run in runs for row in run.rows)
+    text += f"; {plural(failed, 'row')} failed" if failed else "; no row failed"
+    if left := sum(row.is_left for run in runs for row in run.rows):
+        text += f", {left} {'was' if left == 1 else 'were'} not run yet"
+    return f"{text}.{_doubt(recordings, seeds)}"
+
+
+def _doubt(recordings: int, seeds: Sequence[int]) -> str:
+    if recordings < 2:
+        return " With fewer than two recordings there are no intervals."
+    doubts = [" With so few recordings the intervals are rough."] if recordings < _FEW_RECORDINGS else []
+    if seeds and min(seeds) < _FEW_SEEDS:
+        part = "the" if min(seeds) == 1 else "much of the"
+        doubts.append(f" Intervals of rows with {plural(min(seeds), 'seed')} leave out {part} chance in training.")
+    return "".join(doubts)
+
+
+def _tiles(scores: Scores, model: Row, other: Row) -> tuple[Tile, ...]:
+    differences: Mapping[str, Estimate] = {
+        column: scores[model.name].minus(scores[other.name], column) for column in DIFFERENCE_COLUMNS
+    }
+    bounds = [abs(v) for d in differences.values() for v in (d.value, d.low, d.high) if isfinite(v)]
+    reach = 1.1 * max([*bounds, 1e-3])
+    results = " and ".join(f"{plural(len(row.results), 'result')} of {row.name}" for row in (model, other))
+    behind = f"{results}, {plural(model.windows, 'window')}"
+    return tuple(_tile(LABELS[column], difference, reach, behind) for column, difference in differences.items())
+
+
+def _tile(label: str, difference: Estimate, reach: float, behind: str) -> Tile:
+    value, tone = signed(difference.value), verdict(difference)
+    title = f"{label}: {behind}; {interval_phrase(difference, with_sign=True)}"
+    if not isfinite(difference.value):
+        return Tile(label, value, "", tone, "absent", title)
+    ends = (v if isfinite(v) else difference.value for v in (difference.value, difference.low, difference.high))
+    places = (round(50 + 50 * end / reach, 1) for end in ends)
+    note = interval(difference, with_sign=True) or "no interval"
+    return Tile(label, value, note, tone, _WORDS[tone], title, *places)
+
+
+def _pair(found: Headline) -> tuple[Row, Row] | None:
+    """Choose the two rows that the head of the page compares, a baseline as the second."""
+    if found.rival is not None and found.best.is_baseline and not found.rival.is_baseline:
+        return found.rival, found.best
+    other = found.reference or found.rival
+    return None if other is None else (found.best, other)
+
+
+def _kind(best: Row, rival: Row) -> str:
+    if best.is_baseline == rival.is_baseline:
+        return "the runner-up"
+    return "the best baseline" if rival.is_baseline else "the best model that is not a baseline"
+
+
+def title_of(runs: Sequence[Run]) -> str:
+    """Name a page by its runs' titles, with what tells them apart in front."""
+    titles = [run.record.title for run in runs]
+    if len(runs) < 2:
+        return titles[0]
+    if len(set(titles)) == 1:
+        return f"{' and '.join(run.tag for run in runs)}: {titles[0]}"
+    return "; ".join(f"{run.tag}: {run.record.title}" for run in runs)
