@@ -66,7 +66,9 @@ def _like_for_like(scores: Scores, found: Headline) -> Markup:
     best = scores[found.best.name]
     several = found.compared < found.sharing
     asked = f"Like for like ({question_words(found.best, found.best)}; {plural(found.compared, 'row')}), " * several
-    start = _say("{}{} has the highest mean class IoU, {}", asked, _name(found.best), number(best.mean[HEADLINE]))
+    start = _say(
+        "{}{} has the highest mean class IoU, {} without unknown", asked, _name(found.best), number(best.mean[HEADLINE])
+    )
     if found.rival is None:
         return start + _say(" ({}); there is no other row to compare with.", interval_phrase(best.estimate(HEADLINE)))
     lead = best.minus(scores[found.rival.name], HEADLINE)

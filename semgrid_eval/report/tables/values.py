@@ -61,11 +61,11 @@ def reference_scores(entry: RowScores, scores: Scores, rows: Sequence[Row] = ())
 def best_rows(scores: Scores, column: str) -> set[str]:
     """Name the rows that are the best of those on the same cells; none is where it stands alone among others.
 
-    Rows that are told of the truth do not compete.
+    Rows that are told of the truth, or of when answers will be used, do not compete.
     """
     groups: dict[object, dict[str, float]] = {}
     for name, entry in scores.items():
-        if entry.row.uses_truth:
+        if entry.row.uses_truth or entry.row.is_oracle:
             continue
         sign = {"higher": 1.0, "lower": -1.0, "": np.nan}[column_of(entry.metric, column).better]
         groups.setdefault(entry.cells_key, {})[name] = entry.mean[column] * sign
