@@ -37,7 +37,8 @@ def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | N
         return []
     kept = {run.folder: RunThumbnails(run) for run in runs}
     main, *others = chosen
-    plans = [_main_plan(main), *({"": choose(each, best=_OTHER, worst=_OTHER)} for each in others)]
+    plans = [_main_plan(main)]
+    plans += [{"": choose(each, best=_OTHER, worst=_OTHER)} for each in others]
     read = lru_cache(1)(read_windows)  # contests that share windows are drawn one after the other
     order = sorted(range(len(chosen)), key=lambda i: chosen[i].model.window_set)
     drawn = {i: groups_of(chosen[i], plans[i], kept[chosen[i].model.run], read) for i in order}

@@ -3,6 +3,7 @@
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from semgrid_eval.report.claims.claims import on_cityscapes
 from semgrid_eval.report.claims.findings import Finding, find
 from semgrid_eval.report.estimates.bootstrap import (
     Everything,
@@ -60,7 +61,7 @@ def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
     streams, moving = strategies(everywhere(everything, "iou")), everything["iou"]["actors"].get("moving", {})
     everything = without(everything, delayed(streams))
     scores = everywhere(everything, "iou")
-    tables = score_tables(scores, runs)
+    tables = score_tables(scores, [each.tag for each in runs], {each.folder for each in runs if on_cityscapes(each)})
     figures = {
         "categories": categories.category_plots(scores),
         "horizon": categories.horizon_plots(scores),

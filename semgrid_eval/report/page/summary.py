@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from semgrid_eval.errors import printable
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, Scores
-from semgrid_eval.report.page.material import Material
+from semgrid_eval.report.estimates.streams import Strategy
 from semgrid_eval.report.rows.load import Row, Run, key_of
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, Headline, verdict
 from semgrid_eval.report.rows.words import otherwise_asked, question_words
@@ -45,13 +45,13 @@ class Summary:
     tiles: tuple[Tile, ...]
 
 
-def summarise(material: Material, found: Headline | None) -> Summary:
+def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None, streams: Sequence[Strategy] = ()) -> Summary:
     """Put a report into a few sentences."""
-    scores, evidence = material.scores, _evidence(material.runs, material.scores)
+    evidence = _evidence(runs, scores)
     if found is None:
         return Summary(("No row has a score: nothing can be compared.", evidence), "", ())
     more = (
-        stream_sentence(material.streams),
+        stream_sentence(streams),
         way_sentence(scores, found.best),
         not_compared_sentence([entry.row for entry in scores.values()]),
         evidence,

@@ -92,7 +92,7 @@ def render_page(material: Material) -> str:
         version=__version__,
         runs=runs,
         title=title_of(runs),
-        summary=summarise(material, found),
+        summary=summarise(runs, scores, found, material.streams),
         chart=draw_chart(scores),
         same=material.same,
         axes=chooser_axes(runs),

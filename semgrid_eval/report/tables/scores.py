@@ -1,14 +1,14 @@
 """The page's tables: scores, confusions and costs, and what each row changes."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.report.claims.claims import PAPER_DATASET
 from semgrid_eval.report.estimates.bootstrap import LABELS, Everything, Parts, RowScores, Scores, everywhere
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
-from semgrid_eval.report.rows.load import Row, Run, comparable
+from semgrid_eval.report.rows.load import Row, comparable
 from semgrid_eval.report.rows.pairing import (
     DIFFERENCE_COLUMNS,
     HEADLINE,
@@ -37,10 +37,15 @@ _MERGED = (
 )
 
 
-def score_tables(scores: Scores, runs: Sequence[Run]) -> dict[str, Table | None]:
-    """Make the page's tables of IoU over all cells; one with nothing to show is None or has no lines."""
-    in_runs = f"The same rows in several runs: differences to {runs[0].tag or 'the first run'}."
-    on_cityscapes = {run.folder for run in runs if {log.dataset for log in run.record.logs} == {PAPER_DATASET}}
+def score_tables(scores: Scores, tags: Sequence[str], on_cityscapes: Collection[Path] = ()) -> dict[str, Table | None]:
+    """Make the page's tables of IoU over all cells; one with nothing to show is None or has no lines.
+
+    Args:
+        scores: of the rows to show.
+        tags: of the runs.
+        on_cityscapes: the folders of the runs that can be set beside the paper's values.
+    """
+    in_runs = f"The same rows in several runs: differences to {tags[0] if tags else 'the first run'}."
     paper = _PAPER * bool(on_cityscapes)
     return {
         "categories": value_table("categories", _CATEGORIES + paper, scores, _SHOWN, on_cityscapes=on_cityscapes),
