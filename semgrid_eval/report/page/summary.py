@@ -86,7 +86,8 @@ def _of_all(scores: Scores, found: Headline) -> Markup | str:
     lead = overall.minus(scores[found.best.name], HEADLINE)
     start = _say("Of all {} rows with these targets, {} is best, ", found.sharing, _name(found.overall))
     value = f"{number(overall.mean[HEADLINE])}: {signed(lead.value)} over {found.best.name}, {_verdict(lead)}."
-    why = f" It is not asked the same: {otherwise_asked(found.overall, found.best)}."
+    mine, theirs = otherwise_asked(found.overall, found.best), otherwise_asked(found.best, found.overall)
+    why = f" It differs in what it is given or asked: {mine} instead of {theirs}."
     return start + _say("{}{}", value, why)
 
 

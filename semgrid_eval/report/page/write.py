@@ -15,7 +15,8 @@ from semgrid_eval.report.claims.claims import MARGIN
 from semgrid_eval.report.claims.findings import Finding, finding_table, missing_table, sentence
 from semgrid_eval.report.estimates.bootstrap import Level, Parts, Resampling
 from semgrid_eval.report.estimates.paces import EDGES_MPS
-from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, class_style
+from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, SHARE_ENDS, class_style
+from semgrid_eval.report.examples.errors import FEWEST_WINDOWS, error_maps
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
 from semgrid_eval.report.page import exports, provenance
 from semgrid_eval.report.page.chart import draw_chart
@@ -109,6 +110,9 @@ def render_page(material: Material) -> str:
         right_legend=RIGHT_LEGEND,
         examples=examples,
         gaps=gaps(pictured, examples),
+        errors=error_maps(pictured),
+        share_ends=SHARE_ENDS,
+        fewest_windows=FEWEST_WINDOWS,
         widths=widths(pictured),
         stands_mps=EDGES_MPS[0],
         unpaced=rows_without(material.everything["iou"]["paces"], rows),

@@ -31,8 +31,8 @@ def _asked(row: Row, first: Row | None) -> Iterator[str]:
         yield f"{mine.inputs} input{'' if mine.inputs == 1 else 's'}"
     if theirs is None or mine.sensors != theirs.sensors:
         yield _sensors(mine.sensors)
-    if theirs is None or _ahead(row) != _ahead(first):
-        yield from filter(None, [_ahead(row)])
+    if first is None or _ahead(row) != _ahead(first):
+        yield _ahead(row)
     if not mine.translate and (theirs is None or theirs.translate):
         yield "inputs not moved to the target's time"
     if mine.translate and theirs is not None and not theirs.translate:
@@ -43,12 +43,11 @@ def _asked(row: Row, first: Row | None) -> Iterator[str]:
         yield "other targets"
 
 
-def _ahead(row: Row | None) -> str:
-    """Say how far a row looks ahead; a stream whose answers choose that themselves is not asked."""
-    lead_ms = None if row is None else row.record.facts.lead_ms
-    if lead_ms is not None:
+def _ahead(row: Row) -> str:
+    """Say how far a row looks ahead."""
+    if (lead_ms := row.record.facts.lead_ms) is not None:
         return f"{lead_ms:g} ms ahead"
-    return "" if row is None or row.is_stream else f"{row.results[0].record.lead_s:.2f} s ahead"
+    return "no fixed lead" if row.is_stream else f"{row.results[0].record.lead_s:.2f} s ahead"
 
 
 def _sensors(names: tuple[str, ...]) -> str:

@@ -18,7 +18,7 @@ def test_who_wins_by_how_much_and_how_sure_stands_on_the_first_screen(browser, r
     text = " ".join(words for words, _ in parts)
     assert "Like for like (2 inputs, sensor front, 0.29 s ahead; 6 rows), RN-DC has the highest mean class IoU" in text
     assert "Of all 26 rows with these targets, RN-SL5 is best" in text
-    assert "It is not asked the same: 5 inputs." in text
+    assert "It differs in what it is given or asked: 5 inputs instead of 2 inputs." in text
     assert text.count("95% interval") == 2
     assert "6 windows from 6 recordings and 1 seed for each trained row" in text
     assert sum(" to " in words for words, _ in parts[-5:]) == 5  # each tile has its interval

@@ -134,7 +134,7 @@ def test_only_rows_with_as_many_inputs_are_compared_first():
     assert said.startswith(
         "Of all 3 rows with these targets, <strong>ED-SL5</strong> is best, 0.900: +0.300 over ED-DC, "
     )
-    assert said.endswith("It is not asked the same: 5 inputs.")
+    assert said.endswith("It differs in what it is given or asked: 5 inputs instead of 2 inputs.")
 
 
 def test_rows_are_compared_only_with_the_same_targets_in_whichever_run(rows, tmp_path):
