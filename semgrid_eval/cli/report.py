@@ -21,8 +21,9 @@ from semgrid_eval.cli.console import progress, say
 def command(runs: tuple[Path, ...], out: Path | None, resample: Literal["recordings", "groups"]) -> int:
     """Write one self-contained HTML page, CSV tables and figures from what RUN left on disk.
 
-    Prints the path of the page. Several runs are shown side by side, with their differences. Files of RUN that are
-    damaged or lost are named, here and on the page, and the exit code is then 1.
+    Prints the path of the page. Rows of several runs stand in one verdict where their targets match; where they do not,
+    the page says why. Files of RUN that are damaged or lost are named, here and on the page, and the exit code is then
+    1.
     """
     from semgrid_eval.report.page.write import write_report  # here, so that `--help` does not wait for matplotlib
 

@@ -57,9 +57,10 @@ def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None, strea
         evidence,
     )
     sentences = tuple(filter(None, (_like_for_like(scores, found), _of_all(scores, found), *more)))
-    if (pair := _pair(found)) is None:
+    if found.rival is None:
         return Summary(sentences, "", ())
-    return Summary(sentences, f"{pair[0].name} {MINUS} {pair[1].name}", _tiles(scores, *pair))
+    tiles = _tiles(scores, found.best, found.rival)
+    return Summary(sentences, f"{found.best.name} {MINUS} {found.rival.name}", tiles)
 
 
 def _like_for_like(scores: Scores, found: Headline) -> Markup:
@@ -70,7 +71,8 @@ def _like_for_like(scores: Scores, found: Headline) -> Markup:
         "{}{} has the highest mean class IoU, {} without unknown", asked, _name(found.best), number(best.mean[HEADLINE])
     )
     if found.rival is None:
-        return start + _say(" ({}); there is no other row to compare with.", interval_phrase(best.estimate(HEADLINE)))
+        alone = "no other row is asked the same" if several else "there is no other row to compare with"
+        return start + _say(" ({}); {}.", interval_phrase(best.estimate(HEADLINE)), alone)
     lead = best.minus(scores[found.rival.name], HEADLINE)
     over = f"{found.rival.name}, {_kind(found.best, found.rival)}"
     return start + _say(": {} over {}, {}.", signed(lead.value), over, _verdict(lead))
@@ -132,14 +134,14 @@ def _doubt(recordings: int, seeds: Sequence[int]) -> str:
     return "".join(doubts)
 
 
-def _tiles(scores: Scores, model: Row, other: Row) -> tuple[Tile, ...]:
+def _tiles(scores: Scores, best: Row, rival: Row) -> tuple[Tile, ...]:
     differences: Mapping[str, Estimate] = {
-        column: scores[model.name].minus(scores[other.name], column) for column in DIFFERENCE_COLUMNS
+        column: scores[best.name].minus(scores[rival.name], column) for column in DIFFERENCE_COLUMNS
     }
     bounds = [abs(v) for d in differences.values() for v in (d.value, d.low, d.high) if isfinite(v)]
     reach = 1.1 * max([*bounds, 1e-3])
-    results = " and ".join(f"{plural(len(row.results), 'result')} of {row.name}" for row in (model, other))
-    behind = f"{results}, {plural(model.windows, 'window')}"
+    results = " and ".join(f"{plural(len(row.results), 'result')} of {row.name}" for row in (best, rival))
+    behind = f"{results}, {plural(best.windows, 'window')}"
     return tuple(_tile(LABELS[column], difference, reach, behind) for column, difference in differences.items())
 
 
@@ -152,14 +154,6 @@ def _tile(label: str, difference: Estimate, reach: float, behind: str) -> Tile:
     places = (round(50 + 50 * end / reach, 1) for end in ends)
     note = interval(difference, with_sign=True) or "no interval"
     return Tile(label, value, note, tone, _WORDS[tone], title, *places)
-
-
-def _pair(found: Headline) -> tuple[Row, Row] | None:
-    """Choose the two rows that the head of the page compares, a baseline as the second."""
-    if found.rival is not None and found.best.is_baseline and not found.rival.is_baseline:
-        return found.rival, found.best
-    other = found.reference or found.rival
-    return None if other is None else (found.best, other)
 
 
 def _kind(best: Row, rival: Row) -> str:

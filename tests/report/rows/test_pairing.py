@@ -96,7 +96,8 @@ def test_the_summary_says_who_leads_by_how_much_and_on_what_it_rests(run):
     assert "1 row failed" in summary.sentences[2]
     assert "With so few recordings the intervals are rough." in summary.sentences[2]
     assert summary.sentences[2].endswith("Intervals of rows with 2 seeds leave out much of the chance in training.")
-    assert summary.tiles[0].label == "Mean (known)"
+    assert summary.compared == "ED-DC \N{MINUS SIGN} BL-Fuse"
+    assert (summary.tiles[0].label, summary.tiles[0].value) == ("Mean (known)", f"+{lead:.3f}")
     assert all(0 <= tile.low <= tile.at <= tile.high <= 100 for tile in summary.tiles)
 
 
