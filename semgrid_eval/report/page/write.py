@@ -102,6 +102,7 @@ def render_page(material: Material) -> str:
         tables=material.tables,
         order=material.order,
         parts=material.parts,
+        told=any(row.uses_truth for row in rows),
         findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
         margin=MARGIN,
         confusions=[confusion_table(scores[row.name], f"confusion-{i}") for i, row in enumerate(shown)],
