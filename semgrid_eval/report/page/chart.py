@@ -84,7 +84,7 @@ def draw_chart(scores: Scores) -> Chart:
 
     def entry(name: str) -> Entry:
         row, colour = scores[name].row, colours.get(scores[name].row.record.facts.family, _OF_TRUTH)
-        marks = tuple(_mark(scores[name], column, axis, name in best[column]) for column, axis in axes.items())
+        marks = tuple(_mark(scores[name], column, axis, best=name in best[column]) for column, axis in axes.items())
         return Entry(name, row.number, row.record.label, row.uses_truth or row.is_oracle, colour, marks)
 
     groups, told = [], set[str]()

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -25,8 +26,8 @@ from semgrid_eval.report.page.exports import PAGE
 from semgrid_eval.report.page.material import Material, gather
 from semgrid_eval.report.page.replace import check_replaceable, keep_foreign
 from semgrid_eval.report.page.summary import summarise, title_of
-from semgrid_eval.report.rows.load import Row, load_runs
-from semgrid_eval.report.rows.pairing import headline
+from semgrid_eval.report.rows.load import Row, Run, load_runs
+from semgrid_eval.report.rows.pairing import Headline, headline
 from semgrid_eval.report.tables.scores import confusion_table
 
 _SEED = 20190623  # any number does; a fixed one gives the same run the same intervals
@@ -77,52 +78,86 @@ def write_report(
 
 def render_page(material: Material) -> str:
     """Render the page as HTML that needs nothing but itself."""
-    runs, scores = material.runs, material.scores
-    found = headline(scores)
-    rows = [entry.row for entry in scores.values()]
-    pictured = [row for row in rows if not row.is_stream]  # streams keep no predictions
-    examples = example_groups(runs, pictured, None if found is None or found.best.is_stream else found)
-    shown = () if found is None else filter(None, (found.best, found.reference or found.rival))
+    found = headline(material.scores)
     loader, strict = PackageLoader("semgrid_eval.report"), StrictUndefined
     environment = Environment(
         loader=loader, autoescape=True, undefined=strict, trim_blocks=True, lstrip_blocks=True, finalize=_shown
     )
     return environment.get_template("page.html.j2").render(
-        style=Markup(class_style()) + _source("style.css") + _source("examples.css"),
-        script=_source("page.js") + _source("chooser.js") + _source("examples.js") + _source("colours.js"),
-        version=__version__,
-        runs=runs,
-        title=title_of(runs),
-        summary=summarise(runs, scores, found, material.streams),
-        chart=draw_chart(scores),
-        same=material.same,
-        axes=chooser_axes(runs),
-        names={row.number: row.name for run in runs for row in run.rows if row.results},
-        resampled=material.resampling.sentence,
-        tables=material.tables,
-        order=material.order,
-        parts=material.parts,
-        told=any(row.uses_truth for row in rows),
-        findings=[finding_view(each.tag, i, material.findings) for i, each in enumerate(runs)],
-        margin=MARGIN,
-        confusions=[confusion_table(scores[row.name], f"confusion-{i}") for i, row in enumerate(shown)],
-        figures=material.figures,
-        legend=(*CLASS_LEGEND, MASK_LEGEND),
-        right_legend=RIGHT_LEGEND,
-        examples=examples,
-        gaps=gaps(pictured, examples),
-        errors=error_maps(pictured),
-        share_ends=SHARE_ENDS,
-        fewest_windows=FEWEST_WINDOWS,
-        widths=widths(pictured),
-        stands_mps=EDGES_MPS[0],
-        unpaced=rows_without(material.everything["iou"]["paces"], rows),
-        failures=provenance.failures(runs),
-        logs=provenance.log_table(runs),
-        results=provenance.result_table(runs),
-        commands=provenance.command_table(runs),
-        facts=[(each, provenance.facts(each, runs)) for each in runs],
+        **_frame(material),
+        **_verdict(material, found),
+        **_pictures(material, found),
+        **_tables(material, found),
+        **_origins(material.runs),
     )
+
+
+def _frame(material: Material) -> dict[str, Any]:
+    """Return what the page is made with, and what its parts share."""
+    return {
+        "style": Markup(class_style()) + _source("style.css") + _source("examples.css"),
+        "script": Markup().join(map(_source, ("page.js", "chooser.js", "examples.js", "colours.js"))),
+        "version": __version__,
+        "runs": material.runs,
+        "title": title_of(material.runs),
+        "axes": chooser_axes(material.runs),
+        "names": {row.number: row.name for run in material.runs for row in run.rows if row.results},
+    }
+
+
+def _verdict(material: Material, found: Headline | None) -> dict[str, Any]:
+    """Return the head of the page and its one figure."""
+    return {
+        "summary": summarise(material.runs, material.scores, found, material.streams),
+        "resampled": material.resampling.sentence,
+        "chart": draw_chart(material.scores),
+        "same": material.same,
+    }
+
+
+def _pictures(material: Material, found: Headline | None) -> dict[str, Any]:
+    """Return examples and maps of errors, of rows that are no streams, which keep no predictions."""
+    rows = [entry.row for entry in material.scores.values() if not entry.row.is_stream]
+    examples = example_groups(material.runs, rows, None if found is None or found.best.is_stream else found)
+    return {
+        "examples": examples,
+        "gaps": gaps(rows, examples),
+        "widths": widths(rows),
+        "legend": (*CLASS_LEGEND, MASK_LEGEND),
+        "right_legend": RIGHT_LEGEND,
+        "errors": error_maps(rows),
+        "share_ends": SHARE_ENDS,
+        "fewest_windows": FEWEST_WINDOWS,
+    }
+
+
+def _tables(material: Material, found: Headline | None) -> dict[str, Any]:
+    """Return tables and figures of scores, and what is said beside them."""
+    rows = [entry.row for entry in material.scores.values()]
+    shown = () if found is None else filter(None, (found.best, found.reference or found.rival))
+    return {
+        "tables": material.tables,
+        "figures": material.figures,
+        "parts": material.parts,
+        "order": material.order,
+        "told": any(row.uses_truth for row in rows),
+        "findings": [finding_view(each.tag, i, material.findings) for i, each in enumerate(material.runs)],
+        "margin": MARGIN,
+        "confusions": [confusion_table(material.scores[row.name], f"confusion-{i}") for i, row in enumerate(shown)],
+        "stands_mps": EDGES_MPS[0],
+        "unpaced": rows_without(material.everything["iou"]["paces"], rows),
+    }
+
+
+def _origins(runs: Sequence[Run]) -> dict[str, Any]:
+    """Return where the numbers come from, and what failed."""
+    return {
+        "failures": provenance.failures(runs),
+        "logs": provenance.log_table(runs),
+        "results": provenance.result_table(runs),
+        "commands": provenance.command_table(runs),
+        "facts": [(each, provenance.facts(each, runs)) for each in runs],
+    }
 
 
 def rows_without(parts: Parts, rows: Sequence[Row]) -> list[str]:
