@@ -10,7 +10,7 @@ from semgrid_eval.errors import printable
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, Scores
 from semgrid_eval.report.estimates.streams import Strategy
 from semgrid_eval.report.rows.load import Row, Run, key_of
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, Headline, verdict
+from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, VERDICTS, Headline, verdict
 from semgrid_eval.report.rows.words import otherwise_asked, question_words
 from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, plural, signed
 from semgrid_eval.report.tables.streams import stream_sentence
@@ -18,7 +18,6 @@ from semgrid_eval.report.tables.targets import not_compared_sentence
 from semgrid_eval.report.tables.truth import way_sentence
 
 _FEW_RECORDINGS, _FEW_SEEDS = 10, 5
-_WORDS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ def _name(row: Row) -> Markup:
 
 
 def _verdict(difference: Estimate) -> str:
-    return f"{_WORDS[verdict(difference)]} ({interval_phrase(difference, with_sign=True)})"
+    return f"{VERDICTS[verdict(difference)]} ({interval_phrase(difference, with_sign=True)})"
 
 
 def _evidence(runs: Sequence[Run], scores: Scores) -> str:
@@ -153,7 +152,7 @@ def _tile(label: str, difference: Estimate, reach: float, behind: str) -> Tile:
     ends = (v if isfinite(v) else difference.value for v in (difference.value, difference.low, difference.high))
     places = (round(50 + 50 * end / reach, 1) for end in ends)
     note = interval(difference, with_sign=True) or "no interval"
-    return Tile(label, value, note, tone, _WORDS[tone], title, *places)
+    return Tile(label, value, note, tone, VERDICTS[tone], title, *places)
 
 
 def _kind(best: Row, rival: Row) -> str:

@@ -110,6 +110,10 @@ def shared_windows(row: Row, other: Row) -> int:
     return len(mine & theirs)
 
 
+VERDICTS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
+"""What verdicts are called on a page."""
+
+
 def verdict(difference: Estimate) -> str:
     """Put a difference into one word: gain, loss or open (the interval includes zero, or there is none)."""
     return "gain" if difference.low > 0 else "loss" if difference.high < 0 else "open"

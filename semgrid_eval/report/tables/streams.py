@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores, Scores
 from semgrid_eval.report.estimates.leads import LeadSeries
 from semgrid_eval.report.estimates.streams import Strategy, facts_of, pairs_with, plain_strategy, record_of, won_ms
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, verdict
+from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, VERDICTS, verdict
 from semgrid_eval.report.tables.numbers import ABSENT, finite, interval_phrase, number, signed
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
 from semgrid_eval.report.tables.values import evidence
@@ -133,11 +133,10 @@ def stream_sentence(found: Sequence[Strategy]) -> str:
         return ""
     best = max(predicted, key=lambda each: each.measured.mean[HEADLINE])
     gain, won = best.measured.minus(plain.measured, HEADLINE), won_ms(best.measured, plain, HEADLINE)
-    words = {"gain": "better", "loss": "worse", "open": "not clearly different"}[verdict(gain)]
     first = (
         f"{best.name}, whose chain takes {best.delay_ms:.0f} ms, has a mean streaming IoU of "
         f"{number(best.measured.mean[HEADLINE])}; {plain.name}, with {plain.delay_ms:.0f} ms, "
-        f"{number(plain.measured.mean[HEADLINE])}: {signed(gain.value)}, {words} "
+        f"{number(plain.measured.mean[HEADLINE])}: {signed(gain.value)}, {VERDICTS[verdict(gain)]} "
         f"({interval_phrase(gain, with_sign=True)})"
     )
     if not math.isfinite(won.value):
