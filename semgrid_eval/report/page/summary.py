@@ -9,7 +9,7 @@ from markupsafe import Markup
 from semgrid_eval.errors import printable
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, Scores
 from semgrid_eval.report.estimates.streams import Strategy
-from semgrid_eval.report.rows.load import Row, Run, key_of
+from semgrid_eval.report.rows.load import Row, Run, comparable, key_of
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, VERDICTS, Headline, verdict
 from semgrid_eval.report.rows.words import otherwise_asked, question_words
 from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, plural, signed
@@ -46,13 +46,14 @@ class Summary:
 
 def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None, streams: Sequence[Strategy] = ()) -> Summary:
     """Put a report into a few sentences."""
-    evidence = _evidence(runs, scores)
+    rows = [entry.row for entry in scores.values()]
+    evidence = _evidence(runs, [row for row in rows if found is None or comparable(row, found.best)])
     if found is None:
         return Summary(("No row has a score: nothing can be compared.", evidence), "", ())
     more = (
         stream_sentence(streams),
         way_sentence(scores, found.best),
-        not_compared_sentence([entry.row for entry in scores.values()]),
+        not_compared_sentence(rows),
         evidence,
     )
     sentences = tuple(filter(None, (_like_for_like(scores, found), _of_all(scores, found), *more)))
@@ -106,8 +107,7 @@ def _verdict(difference: Estimate) -> str:
     return f"{VERDICTS[verdict(difference)]} ({interval_phrase(difference, with_sign=True)})"
 
 
-def _evidence(runs: Sequence[Run], scores: Scores) -> str:
-    rows = [entry.row for entry in scores.values()]
+def _evidence(runs: Sequence[Run], rows: Sequence[Row]) -> str:
     records = [window for row in rows for result in row.results for window in result.record.windows]
     windows = len(set(map(key_of, records)))
     recordings = len({window.drive for window in records})

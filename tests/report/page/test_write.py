@@ -299,6 +299,7 @@ def test_runs_with_different_windows_are_not_subtracted_and_the_page_says_why(tm
     assert "ED-DC (part) \N{MINUS SIGN} BL-DC (part)" in text
     assert "(part) \N{MINUS SIGN} ED-DC (whole)" not in text
     assert "since their targets are others: BL-DC (part), ED-DC (part) (the logs or their frames)." in text
+    assert "This rests on 6 windows from 3 recordings and 1 seed" in text
     assert "BL-DC (part), ED-DC (part) the logs or their frames (against BL-DC (whole)) 4 4 shared" in text
 
 
