@@ -40,8 +40,9 @@ def command(
 ) -> int:
     """Write one self-contained HTML page, CSV tables and figures from what RUN left on disk.
 
-    Prints the path of the page. Several runs are shown side by side, with their differences. Files of RUN that are
-    damaged or lost are named, here and on the page, and the exit code is then 1.
+    Prints the path of the page. Rows of several runs stand in one verdict where their targets match; where they do not,
+    the page says why. Files of RUN that are damaged or lost are named, here and on the page, and the exit code is then
+    1.
 
     --fail-below makes a gate of two runs, an earlier and a later one. Rows are paired by name; the difference of their
     IoU is taken recording by recording, and a limit fails where the whole interval lies below it. It may be repeated,

@@ -1,11 +1,27 @@
 from pathlib import Path
 
 import pytest
-from support.fake_run import HOSTILE, FakeRow, make_fake_run
+from support.browser import chromium
+from support.fake_run import HOSTILE, REFERENCE_ROWS, FakeRow, make_fake_run
 from support.seen_run import make_seen_run
 
 from semgrid_eval.report.page.write import write_report
 from semgrid_eval.scores.results import read_run, result_folder, write_run
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """A browser for the tests of a module."""
+    with chromium(tmp_path_factory.mktemp("browser")) as driver:
+        yield driver
+
+
+@pytest.fixture(scope="session")
+def reference_page(tmp_path_factory) -> Path:
+    """The page of a run of the shape of the reference run."""
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    run = make_fake_run(folder, rows=REFERENCE_ROWS, recordings=6, windows=1)
+    return write_report(run, tmp_path_factory.mktemp("reports") / "reference")
 
 
 @pytest.fixture(scope="session")

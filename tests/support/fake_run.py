@@ -41,6 +41,7 @@ class FakeRow:
     cell_m: float = 0.78125  # of a grid with other cells, other targets
     disturbed: str = ""  # what is wrong with its inputs; on record
     bound: str = ""  # `upper` and `told` rows are told of the truth
+    same_as: str = ""  # the row whose results it has, by another name
 
     @property
     def name(self) -> str:
@@ -75,6 +76,30 @@ ROWS = (
     FakeRow("Sp2", "ED", wrong=0.10, seeds=2, sensors=("lower", "upper")),
     FakeRow("NT", "ED", translate=False, failure="the loss became not a number in epoch 3"),
 )
+
+
+def _on_parts(what: str, sensors: tuple[str, ...]) -> tuple[FakeRow, ...]:
+    return FakeRow(what, "BL", sensors=sensors), FakeRow(what, "ED", 0.15, 1, sensors=sensors)
+
+
+_SPLIT = ("split2_upper", "split2_lower")
+REFERENCE_ROWS = (
+    *(FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.10, 1)),
+    *(FakeRow("NT", "BL", translate=False), FakeRow("NT", "ED", 0.20, 1, translate=False)),
+    *(row for at in (1, 2) for row in _on_parts(f"Sp{at}", (f"split{at}_upper", f"split{at}_lower"))),
+    FakeRow("SL2", "ED", 0.10, 1, same_as="ED-DC"),
+    *(FakeRow(f"SL{inputs}", "ED", 0.10 - inputs / 100, 1, inputs=inputs) for inputs in (3, 4, 5)),
+    *(FakeRow(f"PH{at}", "BL", horizon_steps=at + 1) for at in (1, 2, 3)),
+    *(FakeRow(f"PH{at}", "ED", 0.10 + at / 20, 1, horizon_steps=at + 1) for at in (1, 2, 3)),
+    *(FakeRow("DC", "RN", 0.08, 1), FakeRow("NT", "RN", 0.18, 1, translate=False)),
+    *(FakeRow("Sp2", "RN", 0.12, 1, sensors=_SPLIT), FakeRow("PH3", "RN", 0.2, 1, horizon_steps=4)),
+    *(FakeRow("Fuse", "BL"), FakeRow("Fuse-SL5", "BL", inputs=5)),
+    *(FakeRow("Table", "BL", learns=True), FakeRow("Flow", "BL")),
+    *(FakeRow(f"PH{at}", "ceiling", 0.01, bound="upper", learns=False, horizon_steps=at + 1) for at in range(4)),
+    *(FakeRow(name, "truth", 0.02, bound="told", learns=False) for name in ("fresh", "motion")),
+    FakeRow("SL5", "RN", 0.01, 1, inputs=5),
+)
+"""As many rows as the preset `reference` has, of the same kinds."""
 
 
 def make_fake_run(
@@ -252,7 +277,7 @@ class _Maker:
     def _result(self, row: FakeRow, seed: int, inputs: Grid, windows_id: str) -> str:
         prediction, certainty = self._predict(row, seed, inputs)
         trained = row.seeds > 0
-        result_id = digest_value([row.name, row.config, seed, self.names])
+        result_id = digest_value([row.same_as or row.name, row.wrong, row.config, seed, self.names])
         folder = results.result_folder(self.run, result_id)
         arrays = {"prediction": prediction, "certainty": certainty}
         results.write_arrays(folder / "predictions.npz", arrays, owner=result_id)

@@ -180,6 +180,11 @@ PAPER_WINDOWS = 500
 """One for each sequence of Cityscapes' validation set."""
 
 
+def on_cityscapes(run: Run) -> bool:
+    """Tell whether all logs of a run are of the paper's data set, so that its values can stand beside the paper's."""
+    return {log.dataset for log in run.record.logs} == {PAPER_DATASET}
+
+
 def in_paper(name: str) -> bool:
     """Tell whether the paper's table has a row of that name."""
     return name in paper_table()

@@ -133,7 +133,7 @@ def _rivals(main: Row, rows: Sequence[Row], headline: Headline) -> list[Row]:
         pair = (headline.best, headline.rival)
         return [row for row in pair if row is not None and row != main][:1]
     unmoved = reference.record.facts.model_copy(update={"translate": False})
-    others = (row for row in rows if row.run == main.run and comparable(row, main) and row != reference)
+    others = (row for row in rows if comparable(row, main) and row != reference)
     return [reference, *(row for row in others if row.record.facts == unmoved)][:_MOST_RIVALS]
 
 

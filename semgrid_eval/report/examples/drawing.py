@@ -20,7 +20,9 @@ POINTLESS_COLOUR = (226, 232, 240)
 HATCH_COLOUR = (0, 255, 255)
 RIGHT_COLOURS = ((0, 0, 0), (128, 132, 138), (0, 114, 178), (230, 159, 0), (90, 60, 90), (255, 255, 255))
 RIGHT_LABELS = ("unknown in all", "both right", "only the model right", "only the baseline right", "both wrong", "M")
-_CERTAINTY_LEVELS = 16
+SHARE_ENDS = ((255, 244, 214), (122, 4, 3))
+"""Colours of no share and of the highest one."""
+_CERTAINTY_LEVELS, _SHARE_LEVELS = 16, 15
 _HATCH_SCALE, _HATCH_STEP = 3, 11  # pixels of an edge of a cell, and from line to line
 
 
@@ -87,6 +89,14 @@ def certainty_png(certainty: Grid) -> bytes:
     # A maximum over C classes lies between 1/C and 1; that range is what the colours are spread over.
     scaled = (certainty / 255 - 1 / CLASS_COUNT) / (1 - 1 / CLASS_COUNT) * (_CERTAINTY_LEVELS - 1)
     return _png(np.rint(scaled.clip(0, _CERTAINTY_LEVELS - 1)).astype(np.uint8), palette)
+
+
+def share_png(shares: NDArray[np.float64]) -> bytes:
+    """Draw shares (H, W) from 0, light, to 1, dark; NaN is transparent."""
+    levels = np.linspace(0, 1, _SHARE_LEVELS)[:, None]
+    palette = np.rint((1 - levels) * SHARE_ENDS[0] + levels * SHARE_ENDS[1]).astype(np.uint8)
+    shown = np.where(np.isnan(shares), _SHARE_LEVELS, np.rint(np.nan_to_num(shares) * (_SHARE_LEVELS - 1)))
+    return _png(shown.astype(np.uint8), np.vstack([palette, palette[:1]]), clear=_SHARE_LEVELS)
 
 
 def right_png(target: Grid, prediction: Grid, baseline: Grid, mask: NDArray[np.bool_]) -> bytes:

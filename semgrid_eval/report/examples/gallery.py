@@ -37,15 +37,25 @@ def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | N
         return []
     kept = {run.folder: RunThumbnails(run) for run in runs}
     main, *others = chosen
-    plans = [
-        {"": choose(main, best=_BEST, worst=_WORST), ", class by class": choose_by_class(main)},
-        *({"": choose(each, best=_OTHER, worst=_OTHER)} for each in others),
-    ]
+    plans = [_main_plan(main)]
+    plans += [{"": choose(each, best=_OTHER, worst=_OTHER)} for each in others]
     read = lru_cache(1)(read_windows)  # contests that share windows are drawn one after the other
     order = sorted(range(len(chosen)), key=lambda i: chosen[i].model.window_set)
     drawn = {i: groups_of(chosen[i], plans[i], kept[chosen[i].model.run], read) for i in order}
     first, *rest = (group for i in sorted(drawn) for group in drawn[i])
     return [replace(first, shown=True), *rest]
+
+
+def _main_plan(contest: Contest) -> dict[str, Sequence[Pick]]:
+    """Choose a good and a bad window to begin with, more of both, and then some by class."""
+    picks = choose(contest, best=_BEST, worst=_WORST)
+    lead = {pick.reason: pick for pick in reversed(picks)}.values()
+    more = [pick for pick in picks if pick not in lead]
+    return {
+        "": [pick for pick in picks if pick in lead],
+        **({", more windows": more} if more else {}),
+        ", class by class": choose_by_class(contest),
+    }
 
 
 def groups_of(

@@ -16,8 +16,8 @@ from semgrid_eval.classes import CATEGORY_NAMES
 from semgrid_eval.report.claims.claims import paper_value
 from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
 from semgrid_eval.report.figures import style
-from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.rows.pairing import by_question, rows_alike, settings_but
+from semgrid_eval.report.rows.words import question_words
 
 _GAP = 1.0  # between questions, in bars' places; the words of a question stand in it
 _BAR_IN, _AROUND_IN = 0.19, 0.75  # height of a bar's place, and of title, legend and axis together
@@ -70,7 +70,7 @@ def lay_out(scores: Scores) -> list[Group]:
     questions = by_question([row for row in known if not row.uses_truth])
     for rows in questions:
         ordered = sorted(rows, key=lambda row: not row.is_baseline)
-        words = ", ".join(_differences(rows[0], questions[0][0])) or ", ".join(_differences(rows[0], None))
+        words = question_words(rows[0], questions[0][0])
         told = tuple(scores[row.name] for row in rows_alike(rows[0], known) if row.uses_truth)
         groups.append(Group(words, {row.name: at + i for i, row in enumerate(ordered)}, told))
         at += len(rows) + _GAP
@@ -123,24 +123,15 @@ def _name_rows(axes: Axes, groups: Sequence[Group]) -> None:
     axes.set_ylim(max(places.values()) + 0.6, -_GAP - 0.3)  # downwards
     for group in groups if len(groups) > 1 else ():
         at = (0, min(group.places.values()) - 0.78)
-        axes.annotate(group.words, at, (2, 0), textcoords="offset points", va="center", color=style.MUTED, fontsize=7)
-
-
-def _differences(row: Row, first: Row | None) -> Iterator[str]:
-    """Say what a row's question asks, as far as it is not what the first one asks."""
-    mine, theirs = row.record.facts, None if first is None else first.record.facts
-    if theirs is None or mine.inputs != theirs.inputs:
-        yield f"{mine.inputs} input{'' if mine.inputs == 1 else 's'}"
-    if theirs is None or mine.sensors != theirs.sensors:
-        yield style.short(" + ".join(mine.sensors), 40)
-    if theirs is None or (mine.horizon_steps, mine.step_frames) != (theirs.horizon_steps, theirs.step_frames):
-        yield f"{row.results[0].record.lead_s:.2f} s ahead"
-    if not mine.translate and (theirs is None or theirs.translate):
-        yield "inputs not moved to the target's time"
-    if mine.translate and theirs is not None and not theirs.translate:
-        yield "inputs moved to the target's time"
-    if first is not None and row.targets != first.targets:
-        yield "other targets"
+        axes.annotate(
+            style.short(group.words, 60),
+            at,
+            (2, 0),
+            textcoords="offset points",
+            va="center",
+            color=style.MUTED,
+            fontsize=7,
+        )
 
 
 def horizon_lines(scores: Scores) -> list[list[RowScores]]:
@@ -169,7 +160,8 @@ def horizon_plots(scores: Scores) -> list[style.Plot]:
             axes.set_xticks(leads := sorted({_lead_s(e) for e in drawn.values()}), [f"{lead:.2f}" for lead in leads])
             axes.margins(x=0.12)
         figure.axes[0].set_ylabel("IoU")
-        figure.axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        legend = figure.axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        style.mark_legend(legend, [[entry.row for entry in line] for line in lines])
         figure.supxlabel("lead time / s: from the newest input to the target", fontsize=9)
         caption = "Category IoU over the lead time with 95% intervals, a line for rows that differ in the horizon alone"
         caption += f" ({style.evidence(drawn)}){style.paper_note(drawn)}"
@@ -181,11 +173,14 @@ def _line(axes: Axes, line: Sequence[RowScores], category: str, colour: str) -> 
     estimates = [entry.estimate(category) for entry in line]
     name = style.short(f"{line[0].row.name} \N{HORIZONTAL ELLIPSIS} {line[-1].row.name}")
     form = "o:" if line[0].row.uses_truth else "o-"
-    axes.plot(leads, [e.value for e in estimates], form, color=colour, label=name, markersize=4)
+    drawn: list[Artist] = [
+        *axes.plot(leads, [e.value for e in estimates], form, color=colour, label=name, markersize=4)
+    ]
     low, high = [e.low for e in estimates], [e.high for e in estimates]
-    axes.fill_between(leads, low, high, color=colour, alpha=0.18, linewidth=0)
+    drawn.append(axes.fill_between(leads, low, high, color=colour, alpha=0.18, linewidth=0))
     papers = [paper_value(entry.row.record.name, category) for entry in line]
-    axes.plot(leads, papers, "D", markersize=4, **(style.PAPER_MARKS | {"markeredgecolor": colour}))
+    drawn += axes.plot(leads, papers, "D", markersize=4, **(style.PAPER_MARKS | {"markeredgecolor": colour}))
+    style.mark([entry.row for entry in line], *drawn)
 
 
 def _lead_s(entry: RowScores) -> float:

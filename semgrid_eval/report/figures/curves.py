@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, StrMethodFormatter
 
 from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
-from semgrid_eval.report.figures.style import INK, SETTINGS, Plot, finish, line_style, short
+from semgrid_eval.report.figures.style import INK, SETTINGS, Plot, finish, line_style, mark, mark_legend, short
 from semgrid_eval.report.rows.load import Result, Row
 from semgrid_eval.scores.metrics.table import CALIBRATION
 
@@ -47,12 +47,14 @@ def calibration_plots(scores: Scores) -> list[Plot]:
         for index, (entry, table) in enumerate(curves, start=1):
             error = entry.mean["calibration_error"]
             style = line_style(index) | {"label": f"{short(entry.row.name)}, error {error:.3f}"}
-            right.plot(table.certainty, table.right, marker="o", markersize=3, **style)
-            cells.plot(table.certainty, table.cells / table.cells.sum(), linewidth=1.2, **style)
+            drawn = right.plot(table.certainty, table.right, marker="o", markersize=3, **style)
+            drawn += cells.plot(table.certainty, table.cells / table.cells.sum(), linewidth=1.2, **style)
+            mark([entry.row], *drawn)
         right.set(ylabel="share of right cells", xlim=(0, 1), ylim=(0, 1))
         cells.set(xlabel="certainty", ylabel="of all cells", yscale="log")
         cells.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g}%"))
-        right.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        legend = right.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        mark_legend(legend, [[entry.row] for entry, _ in curves])
         return [finish(figure, "calibration", "calibration.csv", _CAPTION)]
 
 
@@ -109,17 +111,18 @@ def training_plots(rows: Sequence[Row]) -> list[Plot]:
         for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
             ticks(StrMethodFormatter("{x:g}"))
         axes.tick_params(axis="y", which="minor", labelsize=7)
-        axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        legend = axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        mark_legend(legend, [[row] for row in trained])
         caption = "Training loss (thin, one line a seed) and validation loss (thick, mean over seeds) by epoch."
         return [finish(figure, "training", "training.csv", caption)]
 
 
 def _draw_curves(axes: Axes, row: Row, style: dict[str, Any]) -> None:
     for curve in (_curve(result.history, "loss") for result in row.results):
-        axes.plot(range(1, len(curve) + 1), curve, linewidth=0.7, alpha=0.6, **style)
+        mark([row], *axes.plot(range(1, len(curve) + 1), curve, linewidth=0.7, alpha=0.6, **style))
     checks = [check for result in row.results if (check := _curve(result.history, "validation_loss"))]
     mean = [float(np.mean(losses)) for losses in zip(*checks, strict=False)]  # as far as the shortest goes
-    axes.plot(range(1, len(mean) + 1), mean, linewidth=2, label=short(row.name), **style)
+    mark([row], *axes.plot(range(1, len(mean) + 1), mean, linewidth=2, label=short(row.name), **style))
 
 
 def _curve(history: Any, column: str) -> list[float]:  # noqa: ANN401 - a data frame or None

@@ -8,11 +8,12 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
-from semgrid_eval.report.figures.style import INK, PALETTE, SETTINGS, Plot, evidence, finish, short
+from semgrid_eval.report.figures.style import INK, PALETTE, SETTINGS, Plot, evidence, finish, mark, mark_legend, short
 from semgrid_eval.report.rows.pairing import HEADLINE, settings_of
 
 COLUMNS = ("figure", "row", "setting", "value", "by", "by_value", "parameters", "iou", "low", "high")
@@ -73,7 +74,8 @@ def _plot(varied: Varied, name: str) -> Plot:
         score.set(ylabel="mean class IoU without unknown")
         time.set(ylabel="time of a prediction / ms", ylim=(0, slowest_ms))
         front.set(xlabel="time of a prediction / ms", ylabel="mean class IoU without unknown", xlim=(0, slowest_ms))
-        front.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        legend = front.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        mark_legend(legend, [[entry.row for entry in line] for line in lines])
         return finish(figure, name, "settings.csv", _caption(varied))
 
 
@@ -84,15 +86,17 @@ def _draw_line(panels: Sequence[Axes], varied: Varied, line: list[RowScores], in
     reach = float(np.ptp([varied.value(entry) for entry in varied.rows]))
     places = [varied.value(entry) + aside * _ASIDE * reach for entry in line]
     estimates, times = [entry.estimate(HEADLINE) for entry in line], [_window_ms(entry) for entry in line]
+    drawn: list[Artist] = []
     for axes, x in ((score, places), (front, times)):
         for at, estimate in zip(x, estimates, strict=True):
-            axes.plot([at, at], [estimate.low, estimate.high], color=colour, linewidth=0.8, alpha=0.7)
+            drawn += axes.plot([at, at], [estimate.low, estimate.high], color=colour, linewidth=0.8, alpha=0.7)
     values = [estimate.value for estimate in estimates]
-    score.plot(places, values, "o-", color=colour, label=label, markersize=4)
-    time.plot(places, times, "o-", color=colour, label=label, markersize=4)
-    front.plot(times, values, "o", color=colour, label=label, markersize=4)
-    for entry, at, value in zip(line, times, values, strict=True):
-        front.annotate(f"{varied.value(entry):g}", (at, value), (4, -9), textcoords="offset points", fontsize=7)
+    for axes, x, y, form in ((score, places, values, "o-"), (time, places, times, "o-"), (front, times, values, "o")):
+        drawn += axes.plot(x, y, form, color=colour, label=label, markersize=4)
+    for entry, place in zip(line, zip(times, values, strict=True), strict=True):
+        text = f"{varied.value(entry):g}"
+        drawn.append(front.annotate(text, place, (4, -9), textcoords="offset points", fontsize=7))
+    mark([entry.row for entry in line], *drawn)
 
 
 def _front_line(axes: Axes, entries: Sequence[RowScores]) -> None:

@@ -4,12 +4,13 @@ from collections.abc import Sequence
 
 import matplotlib as mpl
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
 from semgrid_eval.report.estimates.streams import Strategy, facts_of, record_of
-from semgrid_eval.report.figures.style import SETTINGS, Plot, evidence, finish, line_style, short
+from semgrid_eval.report.figures.style import SETTINGS, Plot, evidence, finish, line_style, mark, mark_legend, short
 from semgrid_eval.report.rows.pairing import HEADLINE
 
 _CAPTION = (
@@ -56,7 +57,9 @@ def stream_plots(found: Sequence[Strategy], moving: Scores) -> list[Plot]:
             for index, strategy in enumerate(curves):
                 _draw(axes, strategy, scores, column, index)
             axes.set(xlabel="delay of answers, ms", ylabel="streaming IoU", title=f"{LABELS[column]}, {where}")
-        figure.axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        legend = figure.axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        shown = (each for each in curves if any(entry.row.name in panels[-1][2] for entry in each.entries))
+        mark_legend(legend, [[each.measured.row] for each in shown])
         whole = {entry.row.name: entry for each in curves for entry in each.entries}
         return [finish(figure, "streams", "streams.csv", f"{_CAPTION}{evidence(whole)}.")]
 
@@ -68,12 +71,13 @@ def _draw(axes: Axes, strategy: Strategy, scores: Scores, column: str, index: in
     delays = [record_of(entry.row).latency_ms for entry in entries]
     style = line_style(index) | {"linestyle": "--" if _is_bound(entries[0]) else "-"}
     estimates = [entry.estimate(column) for entry in entries]
-    axes.plot(delays, [each.value for each in estimates], marker="o", markersize=3, label=short(strategy.name), **style)
+    values, label = [each.value for each in estimates], short(strategy.name)
+    drawn: list[Artist] = [*axes.plot(delays, values, marker="o", markersize=3, label=label, **style)]
     if (measured := scores.get(strategy.measured.row.name)) is not None:
-        axes.plot([strategy.delay_ms], [measured.mean[column]], marker="o", markersize=8, **style)
-    axes.fill_between(
-        delays, [each.low for each in estimates], [each.high for each in estimates], color=style["color"], alpha=0.12
-    )
+        drawn += axes.plot([strategy.delay_ms], [measured.mean[column]], marker="o", markersize=8, **style)
+    low, high = [each.low for each in estimates], [each.high for each in estimates]
+    drawn.append(axes.fill_between(delays, low, high, color=style["color"], alpha=0.12))
+    mark([strategy.measured.row], *drawn)
 
 
 def _is_bound(entry: RowScores) -> bool:

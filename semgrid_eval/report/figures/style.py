@@ -1,16 +1,21 @@
-"""What a figure of the report is: PNG and SVG, one style, and a form that follows a page's light or dark theme."""
+"""What a figure of the report is: PNG and SVG, one style, and a form that is part of a page and follows its theme."""
 
 import io
+import re
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from markupsafe import escape
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from PIL import Image
 
+from semgrid_eval.errors import printable
 from semgrid_eval.report.claims.claims import in_paper
 from semgrid_eval.report.estimates.bootstrap import Scores
 from semgrid_eval.report.rows.load import Row
@@ -20,7 +25,8 @@ from semgrid_eval.report.tables.numbers import plural
 PALETTE = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
 STROKES = ("-", "--", ":", "-.")
 INK, MUTED, RULE = "#2a2f36", "#5d6670", "#d5d9de"
-_DARK = {INK: "#dfe3e8", MUTED: "#9aa3ad", RULE: "#3a4048"}
+_PROPERTIES = {INK: "--ink", MUTED: "--muted", RULE: "--rule"}
+"""Of a page that a figure becomes a part of, by colour."""
 SETTINGS: Any = {
     "font.family": "sans-serif",
     "font.size": 9,
@@ -41,13 +47,20 @@ SETTINGS: Any = {
 }
 PAPER_MARKS: Any = {"markerfacecolor": "white", "markeredgecolor": INK, "markeredgewidth": 0.8}
 """How the paper's own values are marked: small hollow diamonds."""
+_LEFT_OUT = re.compile(r'<metadata>.*?</metadata>|<!--.*?-->|<g id="patch_1">.*?</g>', re.DOTALL)
+_TAG = re.compile(r"<[a-z][^<>]*>")
+_NAMESPACE = re.compile(r' xmlns(:\w+)?="[^"]*"')
+_ID = re.compile(r' id="([^"]*)"')
+_REFERENCE = re.compile(r'(url\(#|href="#)([^)"]+)')
+_MARK = "row-"
+_ROWS = re.compile(r"row-([\d-]+)\.\d+")
 _NAME_CHARACTERS = 24
 _PICTURE_DPI = 160
 
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure in both forms, the table it was drawn from, what it shows in words, and its natural size."""
+    """A figure in both forms, the table it was drawn from, what it shows in words, and its natural width."""
 
     name: str
     png: bytes
@@ -55,18 +68,26 @@ class Plot:
     source: str
     caption: str
     width_px: int
-    height_px: int
 
     @property
-    def themed_svg(self) -> str:
-        """The SVG with colours that follow the reader's light or dark setting, and without a background."""
-        light, dark = ("".join(f"--c{i}:{c};" for i, c in enumerate(each)) for each in (_DARK, _DARK.values()))
-        media = f"@media (prefers-color-scheme:dark){{:root{{{dark}}}}}"
-        style = f"<style>:root{{{light}}}{media}#patch_1{{display:none}}</style>"
-        text = self.svg
-        for i, colour in enumerate(_DARK):
-            text = text.replace(colour, f"var(--c{i})")
-        return text.replace("<defs>", f"{style}<defs>", 1)
+    def inline_svg(self) -> str:
+        """The SVG as a part of a page: in the page's colours, without a background, what belongs to a row marked."""
+        text = _LEFT_OUT.sub("", self.svg)
+        used = {name for _, name in _REFERENCE.findall(text)}
+
+        def identity(found: re.Match[str]) -> str:
+            if rows := _ROWS.fullmatch(found[1]):
+                return f' data-row="{rows[1].replace("-", " ")}"'
+            return f' id="{self.name}-{found[1]}"' if found[1] in used else ""
+
+        def tag(found: re.Match[str]) -> str:
+            fitted = _REFERENCE.sub(rf"\g<1>{self.name}-\g<2>", _NAMESPACE.sub("", found[0]))
+            for colour, name in _PROPERTIES.items():
+                fitted = fitted.replace(colour, f"var({name})")
+            return _ID.sub(identity, fitted)
+
+        text = _TAG.sub(tag, text)
+        return text.replace("<svg", f'<svg role="img" aria-label="{escape(printable(self.caption))}"', 1)
 
 
 def evidence(scores: Scores) -> str:
@@ -108,9 +129,24 @@ def short(name: str, characters: int = _NAME_CHARACTERS) -> str:
     return name if len(name) <= characters else f"{name[: characters - 1]}\N{HORIZONTAL ELLIPSIS}"
 
 
+def mark(rows: Iterable[Row], *artists: Artist) -> None:
+    """Mark parts of a figure as belonging to rows, so that a page can show and hide them together."""
+    numbers = "-".join(str(row.number) for row in rows)
+    for artist in artists:
+        artist.set_gid(f"{_MARK}{numbers}")
+
+
+def mark_legend(legend: Legend, rows: Iterable[Iterable[Row]]) -> None:
+    """Mark the entries of a legend, in their order."""
+    for mine, handle, text in zip(rows, legend.legend_handles, legend.get_texts(), strict=True):
+        mark(mine, *filter(None, (handle, text)))
+
+
 def finish(figure: Figure, name: str, source: str, caption: str) -> Plot:
     """Save a figure in both forms, the same figure always as the same bytes."""
     picture, drawing = io.BytesIO(), io.BytesIO()
+    for i, artist in enumerate(figure.findobj(lambda artist: (artist.get_gid() or "").startswith(_MARK))):
+        artist.set_gid(f"{artist.get_gid()}.{i}")  # each id once
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")  # names may be in any script
         canvas: Any = FigureCanvasAgg(figure)  # its methods have no types
@@ -121,5 +157,5 @@ def finish(figure: Figure, name: str, source: str, caption: str) -> Plot:
         figure.set_layout_engine("none")  # it has done its work; without this, it would be laid out again
         figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})
     text = drawing.getvalue().decode()
-    width_px, height_px = (round(96 * inches) for inches in figure.get_size_inches())
-    return Plot(name, picture.getvalue(), text[text.index("<svg") :], source, caption, width_px, height_px)
+    width_px = round(96 * figure.get_size_inches()[0])
+    return Plot(name, picture.getvalue(), text[text.index("<svg") :], source, caption, width_px)

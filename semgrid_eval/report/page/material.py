@@ -1,8 +1,9 @@
 """What a report is written from: scores, estimates, tables and figures, all worked out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from semgrid_eval.report.claims.claims import on_cityscapes
 from semgrid_eval.report.claims.findings import Finding, find
 from semgrid_eval.report.estimates.bootstrap import (
     Everything,
@@ -22,6 +23,7 @@ from semgrid_eval.report.figures.streams import stream_plots
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.rows.load import Row, Run
 from semgrid_eval.report.rows.pairing import main_group
+from semgrid_eval.report.rows.words import same_rows
 from semgrid_eval.report.tables.scores import division_tables, score_tables
 from semgrid_eval.report.tables.streams import lead_table, stream_table, wins_table
 from semgrid_eval.report.tables.table import Table
@@ -44,6 +46,7 @@ class Material:
     figures: Mapping[str, Sequence[Plot]]
     expected: Everything  # IoU against what is measured on average, of the rows that are scored so
     order: str  # whether the order of rows is another one there, in a sentence
+    same: Mapping[str, str]  # rows that are left out of tables and figures, since they are another one by another name
     streams: Sequence[Strategy] = ()
     best_leads: Mapping[str, float] = field(default_factory=dict)  # in ms by category
 
@@ -51,12 +54,14 @@ class Material:
 def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
     """Work out everything that a report shows."""
     rows, parts = [row for each in runs for row in each.rows], divisions(runs)
-    everything = score_all(rows, parts, resampling)
+    whole = score_all(rows, parts, resampling)
+    findings = find(runs, everywhere(whole, "iou"), whole["iou"]["actors"])
+    same = same_rows(rows)
+    rows, everything = [row for row in rows if row.name not in same], without(whole, same)
     streams, moving = strategies(everywhere(everything, "iou")), everything["iou"]["actors"].get("moving", {})
-    whole, everything = everything, shown_rows(everything, streams)
+    everything = without(everything, delayed(streams))
     scores = everywhere(everything, "iou")
-    findings = find(runs, scores, everything["iou"]["actors"])
-    tables = score_tables(scores, [each.tag for each in runs])
+    tables = score_tables(scores, [each.tag for each in runs], {each.folder for each in runs if on_cityscapes(each)})
     figures = {
         "categories": categories.category_plots(scores),
         "horizon": categories.horizon_plots(scores),
@@ -70,8 +75,8 @@ def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
     tables |= {"streams": stream_table(streams, warm, moving), "stream_wins": wins_table(streams)}
     tables |= {"stream_leads": lead_table(leads)}
     tables |= {"way": way_table(scores, everything["iou"]["actors"].get("moving", {}), rows), "expected": None}
-    expected, order = score_expected(rows, resampling), ""
-    if scored := everywhere(expected, "iou"):
+    expected, order = score_expected([row for each in runs for row in each.rows], resampling), ""
+    if scored := everywhere(without(expected, same), "iou"):
         found = order_of(scores, scored, main_group([entry.row for entry in scored.values()])[0].targets)
         tables["expected"], order = expected_table(scored, found), order_sentence(scores, scored, found)
     in_parts = division_tables(everything, parts)
@@ -86,14 +91,19 @@ def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
         figures,
         expected,
         order,
+        same,
         tuple(streams),
         best_leads(leads),
     )
 
 
-def shown_rows(everything: Everything, streams: Sequence[Strategy]) -> Everything:
-    """Leave out the rows that differ from others in their latency alone: they have a section of their own."""
-    hidden = {entry.row.name for each in streams for entry in each.entries if entry is not each.measured}
+def delayed(streams: Sequence[Strategy]) -> set[str]:
+    """Name the rows that differ from others in their latency alone: they have a section of their own."""
+    return {entry.row.name for each in streams for entry in each.entries if entry is not each.measured}
+
+
+def without(everything: Everything, hidden: Container[str]) -> Everything:
+    """Leave out rows."""
     return {
         metric: {
             division: {

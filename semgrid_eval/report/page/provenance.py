@@ -103,7 +103,7 @@ def command_table(runs: Sequence[Run]) -> Table:
         for row in run.rows:
             command = row_command(run.record.command, row.record.name, matrix_file(run, runs))
             cells = (Cell(row.record.label), Cell(_state(row)), Cell(command, tone="command"))
-            lines.append(Line(row.name, cells))
+            lines.append(Line(row.name, cells, row=row.number))
     return plain_table("commands", caption, "Row", ("What it does", "Results", "Command"), lines)
 
 
@@ -142,7 +142,9 @@ def log_table(runs: Sequence[Run]) -> Table:
 def result_table(runs: Sequence[Run]) -> Table:
     """List every result: its row, seed, id, windows and cost."""
     rows = [row for run in runs for row in run.rows]
-    lines = [Line(row.name, _result(each.record), title=row.record.label) for row in rows for each in row.results]
+    lines = [
+        Line(row.name, _result(each.record), "", row.record.label, row.number) for row in rows for each in row.results
+    ]
     names = ("Seed", "Result", "Window set", "Windows", "Training", "Prediction", "Device")
     return plain_table("results", "Results behind the rows", "Row", names, lines)
 

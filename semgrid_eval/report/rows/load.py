@@ -77,6 +77,7 @@ class Row:
     run: Path
     groups: Mapping[str, str] = field(default_factory=dict)  # by a log's path
     faults: tuple[str, ...] = ()  # those of the failures that are faults of its files
+    number: int = 0  # its place in the report, counted through all runs from 1
 
     @property
     def is_left(self) -> bool:
@@ -185,8 +186,8 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
     for folder, tag, record in zip(folders, _tags(folders), records, strict=True):
         rows, load = [], _Loader(folder, {log.path: log.group for log in record.logs})
         for row in record.rows:
-            rows.append(load.row(row, f"{row.name} ({tag})" if tag else row.name))
-            progress(next(done), total, row.name)
+            rows.append(load.row(row, f"{row.name} ({tag})" if tag else row.name, number := next(done)))
+            progress(number, total, row.name)
         runs.append(Run(folder, tag, record, tuple(rows), *_besides_scores(folder, rows)))
     return tuple(runs)
 
@@ -254,7 +255,7 @@ class _Loader:
         self._run, self._groups = run, groups
         self._windows: dict[tuple[files.WindowRecord, ...], tuple[files.WindowRecord, ...]] = {}
 
-    def row(self, row: files.RowRecord, name: str) -> Row:
+    def row(self, row: files.RowRecord, name: str, number: int) -> Row:
         failures = [] if row.failure in (None, files.NOT_RUN) else [row.failure]
         found, faults = [], []
         for result_id in row.results:
@@ -267,7 +268,7 @@ class _Loader:
             failures.append("it has no result")
         if found and not any(result.record.windows for result in found):
             failures.append("it has no window to score")
-        return Row(name, row, tuple(found), tuple(failures), self._run, self._groups, tuple(faults))
+        return Row(name, row, tuple(found), tuple(failures), self._run, self._groups, tuple(faults), number)
 
     def _result(self, folder: Path) -> Result:
         record = files.read_result(folder)

@@ -9,7 +9,7 @@ from semgrid_eval.report.estimates.bootstrap import Estimate, Scores
 from semgrid_eval.report.rows.load import Row, comparable, key_of
 
 HEADLINE = "mean_known"
-DIFFERENCE_COLUMNS = ("static_known", "small_static", "vehicles", "small_dynamic", HEADLINE)
+DIFFERENCE_COLUMNS = (HEADLINE, "static_known", "small_static", "vehicles", "small_dynamic")
 _UNSET = "not set"
 _OF_TARGETS = ("grid.", "window.", "validation_window", "validation_split", "train_split", "hold_out", "mask_mode")
 """Starts of the keys of settings that decide the targets; with `hold_out`, what is scored is of `train_split`."""
@@ -17,10 +17,12 @@ _OF_TARGETS = ("grid.", "window.", "validation_window", "validation_split", "tra
 
 @dataclass(frozen=True)
 class Headline:
-    """The best row of the main group of `compared` rows, and the rows it is measured against."""
+    """The best row of the main group of `compared` rows, the rows it is measured against, and the best of all rows."""
 
     compared: int
     best: Row
+    overall: Row  # the best of the rows with the same targets, whatever else they are asked
+    sharing: int  # how many these are
     rival: Row | None  # the best row of the other kind (baseline or not), else the runner-up
     reference: Row | None  # the baseline of the best row
 
@@ -40,13 +42,13 @@ def by_question(rows: Sequence[Row]) -> list[list[Row]]:
 def reference_of(row: Row, rows: Sequence[Row]) -> Row | None:
     """Choose the baseline that a row is measured against, None for a baseline and where there is none.
 
-    It is a baseline of the same run, with the same targets and disturbance, that looks as many frames ahead. Of these,
-    the one is taken that shares more with the row, in this order: the sensors, whether inputs are moved to the target's
-    time, the number of inputs, the frames between them; then one that does not learn; then the first in the matrix.
+    It is a baseline with the same targets and disturbance that looks as many frames ahead. Of these, the one is taken
+    that shares more with the row, in this order: the run, the sensors, whether inputs are moved to the target's time,
+    the number of inputs, the frames between them; then one that does not learn; then the first in the matrix.
     """
     if row.is_baseline:
         return None
-    baselines = (other for other in rows if other.is_baseline and other.run == row.run and comparable(row, other))
+    baselines = (other for other in rows if other.is_baseline and comparable(row, other))
     alike = (other for other in baselines if other.disturbed == row.disturbed)
     choices = [other for other in alike if row.is_stream or _frames_ahead(other) == _frames_ahead(row)]
     return max(choices, key=lambda other: _nearness(row, other), default=None)
@@ -64,8 +66,8 @@ def main_group(rows: Sequence[Row]) -> list[Row]:
 def way_of(row: Row, rows: Sequence[Row]) -> tuple[Row, Row] | None:
     """Find the ends of the way that a row is measured by: what anybody has, and what nobody exceeds.
 
-    Both are of the same run, have the same targets and look as many frames ahead. None for such rows themselves, and
-    where an end is missing.
+    Both have the same targets and look as many frames ahead, and are rather of the same run. None for such rows
+    themselves, and where an end is missing.
     """
     if row.is_stream:  # its delay is part of what it is: `report.tables.streams` compares streams
         return None
@@ -79,8 +81,8 @@ def way_of(row: Row, rows: Sequence[Row]) -> tuple[Row, Row] | None:
 
 
 def rows_alike(row: Row, rows: Sequence[Row]) -> list[Row]:
-    """Return the rows of the same run with the same targets that look as many frames ahead, itself among them."""
-    alike = [other for other in rows if other.run == row.run and comparable(row, other)]
+    """Return the rows with the same targets that look as many frames ahead, itself among them."""
+    alike = [other for other in rows if comparable(row, other)]
     return [other for other in alike if _frames_ahead(other) == _frames_ahead(row)]
 
 
@@ -91,17 +93,25 @@ def headline(scores: Scores) -> Headline | None:
     if not rows:
         return None
     group = main_group(rows)
-    best = max(group, key=lambda row: scores[row.name].mean[HEADLINE])
+
+    def mean(row: Row) -> float:
+        return scores[row.name].mean[HEADLINE]
+
+    best = max(group, key=mean)
     others = [row for row in group if row.is_baseline != best.is_baseline]
-    others = others or [row for row in group if row != best]
-    rival = max(others, key=lambda row: scores[row.name].mean[HEADLINE], default=None)
-    return Headline(len(group), best, rival, reference_of(best, rows))
+    rival = max(others or [row for row in group if row != best], key=mean, default=None)
+    sharing = [row for row in rows if comparable(row, best) and row.disturbed == best.disturbed]
+    return Headline(len(group), best, max(sharing, key=mean), len(sharing), rival, reference_of(best, rows))
 
 
 def shared_windows(row: Row, other: Row) -> int:
     """Count the target frames that both rows are scored on."""
     mine, theirs = ({key_of(w) for w in each.results[0].record.windows} for each in (row, other))
     return len(mine & theirs)
+
+
+VERDICTS = {"gain": "clearly better", "loss": "clearly worse", "open": "not clearly different"}
+"""What verdicts are called on a page."""
 
 
 def verdict(difference: Estimate) -> str:
@@ -115,9 +125,14 @@ def _frames_ahead(row: Row) -> tuple[int, float | None]:
 
 
 def _nearness(row: Row, other: Row) -> tuple[bool, ...]:
-    """Order baselines by how much of the row's question they share."""
+    """Order baselines by how much of the row's run and question they share."""
     mine, theirs = row.record.facts, other.record.facts
-    shared = (mine.sensors == theirs.sensors, mine.translate == theirs.translate, mine.inputs == theirs.inputs)
+    shared = (
+        row.run == other.run,
+        mine.sensors == theirs.sensors,
+        mine.translate == theirs.translate,
+        mine.inputs == theirs.inputs,
+    )
     plain = theirs.stream is None or (theirs.stream.moved and theirs.bound == "lower")
     return (*shared, mine.step_frames == theirs.step_frames, not theirs.learns, plain)
 

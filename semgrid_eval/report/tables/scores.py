@@ -1,49 +1,57 @@
-"""The page's tables: scores, confusions and costs, what each row changes, and what cannot be compared at all."""
+"""The page's tables: scores, confusions and costs, and what each row changes."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from semgrid_eval.classes import CLASS_NAMES, KNOWN_IDS
+from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.estimates.bootstrap import LABELS, Everything, Parts, RowScores, Scores, everywhere
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.rows.load import Row, comparable
 from semgrid_eval.report.rows.pairing import (
     DIFFERENCE_COLUMNS,
+    HEADLINE,
     changed_settings,
-    changed_targets,
-    main_group,
     settings_of,
-    shared_windows,
 )
 from semgrid_eval.report.tables.disturbances import disturbance_table
 from semgrid_eval.report.tables.numbers import ABSENT, MINUS, interval_phrase, number, plural
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, plain_table
+from semgrid_eval.report.tables.targets import not_compared_table
 from semgrid_eval.report.tables.values import difference_table, run_differences, side_by_side, value_table
 from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS, MERGED_COLUMNS
 from semgrid_eval.scores.metrics.metric import Metric, divided
 from semgrid_eval.scores.metrics.table import IOU, METRICS
 
 _PAPER = (
-    "The paper's values (Table A1) come from Cityscapes' validation set; "
+    " The paper's values (Table A1) come from Cityscapes' validation set; "
     "differences to them are marked where the row's interval excludes them."
 )
-_CATEGORIES = f"Category scores: mean of the class IoUs, with 95% interval. Best of each column in bold. {_PAPER}"
-_CLASSES = f"Class IoU with 95% interval. {_PAPER}"
+_CATEGORIES = "Category scores: mean of the class IoUs, with 95% interval. Best of each column in bold."
+_CLASSES = "Class IoU with 95% interval."
+_SHOWN = (HEADLINE, *(name for name in CATEGORY_COLUMNS if name != HEADLINE))
 _MERGED = (
     "Category scores after merging the classes of a category, as the Cityscapes benchmark does. "
     "It leaves void out, as Static (known, merged) leaves out unknown."
 )
 
 
-def score_tables(scores: Scores, tags: Sequence[str]) -> dict[str, Table | None]:
-    """Make the page's tables of IoU over all cells; one with nothing to show is None or has no lines."""
+def score_tables(scores: Scores, tags: Sequence[str], on_cityscapes: Collection[Path] = ()) -> dict[str, Table | None]:
+    """Make the page's tables of IoU over all cells; one with nothing to show is None or has no lines.
+
+    Args:
+        scores: of the rows to show.
+        tags: of the runs.
+        on_cityscapes: the folders of the runs that can be set beside the paper's values.
+    """
     in_runs = f"The same rows in several runs: differences to {tags[0] if tags else 'the first run'}."
+    paper = _PAPER * bool(on_cityscapes)
     return {
-        "categories": value_table("categories", _CATEGORIES, scores, CATEGORY_COLUMNS, beside_paper=True),
+        "categories": value_table("categories", _CATEGORIES + paper, scores, _SHOWN, on_cityscapes=on_cityscapes),
         "differences": difference_table("differences", _to_baseline("category"), scores, DIFFERENCE_COLUMNS),
         "class_differences": difference_table("class-differences", _to_baseline("class"), scores, CLASS_NAMES),
-        "classes": value_table("classes", _CLASSES, scores, CLASS_NAMES, beside_paper=True),
+        "classes": value_table("classes", _CLASSES + paper, scores, CLASS_NAMES, on_cityscapes=on_cityscapes),
         "changes": changes_table(scores),
         "disturbances": disturbance_table(scores),
         "not_compared": not_compared_table(scores),
@@ -86,7 +94,7 @@ def cost_table(rows: Sequence[RowScores]) -> Table:
             _time_cell("ms a window", entry.row.window_ms, 1),
             Cell(", ".join(sorted({record.device for record in records}))),
         )
-        lines.append(Line(entry.row.name, cells))
+        lines.append(Line(entry.row.name, cells, row=entry.row.number))
     columns = ("Parameters", "Results", "Training", "Prediction", "Device")
     return plain_table("costs", "What each row cost; times are means over seeds.", "Row", columns, lines)
 
@@ -144,64 +152,13 @@ def changes_table(scores: Scores) -> Table | None:
             continue
         cells = (Cell("; ".join(changed)), *(_change(entry, base, column) for column in DIFFERENCE_COLUMNS))
         sign = MINUS if comparable(entry.row, base.row) else "beside"
-        lines.append(Line(f"{entry.row.name} {sign} {base.row.name}", cells))
+        lines.append(Line(f"{entry.row.name} {sign} {base.row.name}", cells, row=entry.row.number))
     caption = (
         "What each row changes against the row above it that has the same model and the fewest other settings, "
         "and the difference of their scores. Where the targets are others, both scores are shown instead."
     )
     columns = ["Settings", *(LABELS[column] for column in DIFFERENCE_COLUMNS)]
     return plain_table("changes", caption, "Rows", columns, lines) if lines else None
-
-
-def not_compared_table(scores: Scores) -> Table | None:
-    """List the rows whose targets are others than those of the main group, and what makes them so."""
-    rows = [entry.row for entry in scores.values()]
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(row.targets, []).append(row)
-    if len(groups) < 2:
-        return None
-    main = main_group(rows)[0]
-    with_main = groups.pop(main.targets)
-    caption = (
-        f"Not compared with {main.name} and the rows that share its targets. Scores are subtracted only between "
-        "rows with the same targets: the same frames of the same logs, grid, mask mode and split."
-    )
-    lines = [_other_targets(group, with_main) for group in groups.values()]
-    columns = ("What differs", "Windows", "Known of a target")
-    return plain_table("not-compared", caption, "Rows with the same targets", columns, lines)
-
-
-def _other_targets(group: Sequence[Row], with_main: Sequence[Row]) -> Line:
-    """Say what makes the targets of a group of rows others than those of the row that they are closest to."""
-    row = group[0]
-    base = min(with_main, key=lambda other: len(changed_settings(settings_of(other), settings_of(row))))
-    reasons = changed_targets(settings_of(base), settings_of(row)) or ["the logs or their frames"]
-    shared = shared_windows(row, base)
-    cells = (
-        Cell(f"{'; '.join(reasons)} (against {base.name})"),
-        Cell(f"{row.windows:,}", row.windows, f"{shared:,} shared"),
-        _known_cell(row, base),
-    )
-    return Line(", ".join(each.name for each in group), cells)
-
-
-def _known_cell(row: Row, base: Row) -> Cell:
-    """Show how much of a target is known on average, and how much more or less that is than another row has."""
-    area_m2, of_base_m2 = known_m2(row), known_m2(base)
-    if not np.isfinite(area_m2):
-        return Cell(ABSENT)
-    note = f"{area_m2 / of_base_m2:.1%} of {base.name}'s" if of_base_m2 > 0 else ""
-    return Cell(f"{area_m2:,.0f} m\N{SUPERSCRIPT TWO}", area_m2, note)
-
-
-def known_m2(row: Row) -> float:
-    """Return the mean area that is known in a target in square metres, NaN where the size of cells is not told."""
-    grid = row.results[0].grid
-    if grid is None:
-        return np.nan
-    cells = row.results[0].counts[:, list(KNOWN_IDS)].sum(axis=(1, 2)).mean()
-    return float(cells * grid.spec.cell_m**2)
 
 
 def _closest(entry: RowScores, above: Sequence[RowScores]) -> RowScores | None:

@@ -6,12 +6,11 @@ from collections.abc import Iterator, Sequence
 from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores, Scores
 from semgrid_eval.report.estimates.leads import LeadSeries
 from semgrid_eval.report.estimates.streams import Strategy, facts_of, pairs_with, plain_strategy, record_of, won_ms
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, verdict
+from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, VERDICTS, verdict
 from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, signed
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
 from semgrid_eval.report.tables.values import evidence
 
-_COLUMNS = (*DIFFERENCE_COLUMNS[:-1], HEADLINE)
 _MOVING = ("vehicles", "person")
 _STREAMS = (
     "Streaming IoU: at each time of evaluation, the newest grid that was published by then against what is measured at "
@@ -35,7 +34,7 @@ def stream_table(found: Sequence[Strategy], warm: Scores, moving: Scores) -> Tab
     """Show every strategy at its least delay; None where there is no stream."""
     if not found:
         return None
-    columns = [(LABELS[column], "") for column in _COLUMNS]
+    columns = [(LABELS[column], "") for column in DIFFERENCE_COLUMNS]
     columns += [("Mean", "after the warm-up"), *((LABELS[column], "near moving actors") for column in _MOVING)]
     columns += [("Latency", "ms"), ("Age", "ms"), ("Lead", "ms"), ("Misses", "")]
     return Table("streams", _STREAMS, "Strategy", tuple(columns), tuple((_line(each, warm, moving),) for each in found))
@@ -43,12 +42,13 @@ def stream_table(found: Sequence[Strategy], warm: Scores, moving: Scores) -> Tab
 
 def _line(strategy: Strategy, warm: Scores, moving: Scores) -> Line:
     entry, record = strategy.measured, record_of(strategy.measured.row)
-    cells = [_value(entry, column) for column in _COLUMNS]
+    cells = [_value(entry, column) for column in DIFFERENCE_COLUMNS]
     cells += [_found(warm, entry, HEADLINE), *(_found(moving, entry, column) for column in _MOVING)]
     cells += [_ms(record.latency_ms), _ms(record.age_ms, f"{record.oldest_ms:.0f}"), _ms(record.lead_ms)]
     share = record.misses / max(1, record.evaluations)
     cells.append(Cell(f"{share:.1%}", share, f"of {record.evaluations:,}", f"{record.misses:,} without an answer"))
-    return Line(strategy.name, tuple(cells), "truth" if entry.row.uses_truth else "", entry.row.record.label)
+    kind = "truth" if entry.row.uses_truth else ""
+    return Line(strategy.name, tuple(cells), kind, entry.row.record.label, entry.row.number)
 
 
 def _value(entry: RowScores, column: str) -> Cell:
@@ -70,7 +70,7 @@ def wins_table(found: Sequence[Strategy]) -> Table | None:
     if plain is None:
         return None
     bodies = [tuple(_wins(each, plain)) for each in found if each is not plain and _same(each, plain)]
-    columns = tuple([(LABELS[column], "") for column in _COLUMNS] + [("Won", "ms")])
+    columns = tuple([(LABELS[column], "") for column in DIFFERENCE_COLUMNS] + [("Won", "ms")])
     caption = _WINS.replace("{plain}", plain.name)
     lines = tuple(body for body in bodies if body)
     return Table("stream-wins", caption, f"Strategies less {plain.name}", columns, lines) if lines else None
@@ -85,7 +85,7 @@ def _wins(strategy: Strategy, plain: Strategy) -> Iterator[Line]:
     """Compare delay by delay: the first line is the strategy's, the others belong to it."""
     for place, (entry, other) in enumerate(pairs_with(strategy, plain)):
         cells = []
-        for column in _COLUMNS:
+        for column in DIFFERENCE_COLUMNS:
             difference = entry.minus(other, column)
             title = f"{evidence(entry, column)}; difference: {interval_phrase(difference, with_sign=True)}"
             cells.append(difference_cell(difference, title=title))
@@ -94,7 +94,7 @@ def _wins(strategy: Strategy, plain: Strategy) -> Iterator[Line]:
         added = f"+{added_ms:g} ms" if added_ms else ""
         kind = "part" if place else "truth" if entry.row.uses_truth else ""
         header = added if place else f"{strategy.name} {added}".rstrip()
-        yield Line(header, tuple(cells), kind, entry.row.record.label)
+        yield Line(header, tuple(cells), kind, entry.row.record.label, strategy.measured.row.number)
 
 
 def _won(won: Estimate) -> Cell:
@@ -111,19 +111,19 @@ def _whole(value_ms: float) -> str:
 
 def lead_table(found: Sequence[LeadSeries]) -> Table | None:
     """Show the best lead of each series by category; None where there is none."""
-    columns = tuple((LABELS[column], "ms") for column in _COLUMNS)
+    columns = tuple((LABELS[column], "ms") for column in DIFFERENCE_COLUMNS)
     lines = tuple((_best_leads(series),) for series in found)
     return Table("stream-leads", _LEADS, "Streams", columns, lines) if lines else None
 
 
 def _best_leads(series: LeadSeries) -> Line:
     cells = []
-    for column in _COLUMNS:
+    for column in DIFFERENCE_COLUMNS:
         entry, lead = series.best(column)
         note = f"{lead.low:.0f} to {lead.high:.0f}" if math.isfinite(lead.low) else ""
         cells.append(Cell(f"{lead.value:.0f}", finite(lead.value), note, evidence(entry, column)))
     first, last = series.entries[0], series.entries[-1]
-    return Line(f"{first.row.name} to {last.row.name}", tuple(cells), title=first.row.record.label)
+    return Line(f"{first.row.name} to {last.row.name}", tuple(cells), "", first.row.record.label, first.row.number)
 
 
 def stream_sentence(found: Sequence[Strategy]) -> str:
@@ -138,11 +138,10 @@ def stream_sentence(found: Sequence[Strategy]) -> str:
         return ""
     best = max(predicted, key=lambda each: each.measured.mean[HEADLINE])
     gain, won = best.measured.minus(plain.measured, HEADLINE), won_ms(best.measured, plain, HEADLINE)
-    words = {"gain": "better", "loss": "worse", "open": "not clearly different"}[verdict(gain)]
     first = (
         f"{best.name}, whose chain takes {best.delay_ms:.0f} ms, has a mean streaming IoU of "
         f"{number(best.measured.mean[HEADLINE])}; {plain.name}, with {plain.delay_ms:.0f} ms, "
-        f"{number(plain.measured.mean[HEADLINE])}: {signed(gain.value)}, {words} "
+        f"{number(plain.measured.mean[HEADLINE])}: {signed(gain.value)}, {VERDICTS[verdict(gain)]} "
         f"({interval_phrase(gain, with_sign=True)})"
     )
     if not math.isfinite(won.value):

@@ -25,12 +25,13 @@ class Cell:
 
 @dataclass(frozen=True)
 class Line:
-    """One line of a table: its header, a kind for its style, and its cells."""
+    """One line of a table: its header, its cells, a kind for its style, a tooltip, and the number of its row."""
 
     header: str
     cells: tuple[Cell, ...]
     kind: str = ""
     title: str = ""
+    row: int = 0  # 0 where it is about none
 
 
 @dataclass(frozen=True)

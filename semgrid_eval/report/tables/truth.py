@@ -1,6 +1,7 @@
 """Tables of what the truth tells: shares of the way to the ceiling, scores against what is measured on average."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
 from semgrid_eval.report.estimates.way import Order, Way, ways
@@ -33,7 +34,7 @@ def way_table(scores: Scores, moving: Scores, rows: Sequence[Row]) -> Table | No
         there = near.get(entry.row.name)
         cells += [_share(*there, column) if there else Cell(ABSENT) for column in _MOVING_COLUMNS]
         kind = "truth" if entry.row.uses_truth else ""
-        lines.append((Line(entry.row.name, tuple(cells), kind, entry.row.record.label),))
+        lines.append((Line(entry.row.name, tuple(cells), kind, entry.row.record.label, entry.row.number),))
     lower = ", ".join(dict.fromkeys(way.lower.row.name for _, way in found))
     upper = ", ".join(dict.fromkeys(way.upper.row.name for _, way in found))
     caption = _WAY.replace("{lower}", lower).replace("{upper}", upper)
@@ -45,10 +46,9 @@ def expected_table(expected: Scores, order: Order) -> Table:
     table = value_table("expected", _EXPECTED, expected, DIFFERENCE_COLUMNS)
     places = _places(order)
     bodies = tuple(
-        (Line(body[0].header, (*body[0].cells, places.get(body[0].header, Cell(ABSENT))), body[0].kind, body[0].title),)
-        for body in table.bodies
+        (replace(line, cells=(*line.cells, places.get(line.header, Cell(ABSENT)))),) for (line,) in table.bodies
     )
-    return Table(table.name, table.caption, table.corner, (*table.columns, ("Place", "by the mean")), bodies)
+    return replace(table, columns=(*table.columns, ("Place", "by the mean")), bodies=bodies)
 
 
 def order_sentence(measured: Scores, expected: Scores, order: Order) -> str:

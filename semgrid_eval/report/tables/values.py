@@ -1,7 +1,8 @@
 """Tables of scores: rows beside each other with the best marked, and differences to their baselines."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -17,11 +18,11 @@ _OTHER_TARGETS = " Rows whose targets differ (frames, grids, mask mode or split)
 
 
 def value_table(
-    name: str, caption: str, scores: Scores, columns: Sequence[str], *, beside_paper: bool = False
+    name: str, caption: str, scores: Scores, columns: Sequence[str], *, on_cityscapes: Container[Path] = ()
 ) -> Table:
-    """Show the columns of every row, the best of each marked, beside the paper's values where it has them."""
+    """Show the columns of every row, the best of each marked; in runs on Cityscapes beside the paper's values."""
     best = {column: best_rows(scores, column) for column in columns}
-    bodies = tuple(_value_body(entry, best, beside_paper=beside_paper) for entry in scores.values())
+    bodies = tuple(_value_body(entry, best, beside_paper=entry.row.run in on_cityscapes) for entry in scores.values())
     several = len({entry.row.targets for entry in scores.values()}) > 1
     return Table(name, caption + _OTHER_TARGETS * several, "Row", _headers(scores, columns), bodies)
 
@@ -60,11 +61,11 @@ def reference_scores(entry: RowScores, scores: Scores, rows: Sequence[Row] = ())
 def best_rows(scores: Scores, column: str) -> set[str]:
     """Name the rows that are the best of those on the same cells; none is where it stands alone among others.
 
-    Rows that are told of the truth do not compete.
+    Rows that are told of the truth, or of when answers will be used, do not compete.
     """
     groups: dict[object, dict[str, float]] = {}
     for name, entry in scores.items():
-        if entry.row.uses_truth:
+        if entry.row.uses_truth or entry.row.is_oracle:
             continue
         sign = {"higher": 1.0, "lower": -1.0, "": np.nan}[column_of(entry.metric, column).better]
         groups.setdefault(entry.cells_key, {})[name] = entry.mean[column] * sign
@@ -100,7 +101,8 @@ def _value_body(entry: RowScores, best: Mapping[str, set[str]], *, beside_paper:
         value_cell(entry.estimate(name), title=evidence(entry, name), best=entry.row.name in rows)
         for name, rows in best.items()
     )
-    lines = [Line(entry.row.name, values, "truth" if entry.row.uses_truth else "", title=entry.row.record.label)]
+    name = entry.row.name
+    lines = [Line(name, values, "truth" if entry.row.uses_truth else "", entry.row.record.label, entry.row.number)]
     paper = paper_table().get(entry.row.record.name, {}) if beside_paper else {}
     if set(best) <= set(paper):
         source = f"the paper's {entry.row.record.name}, Table A1: mean over 20 seeds, Cityscapes"
@@ -122,12 +124,14 @@ def _paper_gap(entry: RowScores, column: str, paper: float) -> Cell:
 def _differences(
     name: str, caption: str, pairs: Sequence[tuple[RowScores, RowScores]], columns: Sequence[str]
 ) -> Table | None:
-    bodies = tuple(
-        (Line(f"{entry.row.name} {MINUS} {other.row.name}", tuple(_difference(entry, other, c) for c in columns)),)
-        for entry, other in pairs
-    )
+    bodies = tuple((_difference_line(entry, other, columns),) for entry, other in pairs)
     headers = _headers({entry.row.name: entry for entry, _ in pairs}, columns)
     return Table(name, caption, "Rows", headers, bodies) if bodies else None
+
+
+def _difference_line(entry: RowScores, other: RowScores, columns: Sequence[str]) -> Line:
+    cells = tuple(_difference(entry, other, column) for column in columns)
+    return Line(f"{entry.row.name} {MINUS} {other.row.name}", cells, row=entry.row.number)
 
 
 def _difference(entry: RowScores, other: RowScores, column: str) -> Cell:
@@ -147,11 +151,12 @@ def side_by_side(tables: Mapping[str, Table | None]) -> Table | None:
     if not parts:
         return None
     columns = tuple((label, f"{part}, {note}") for part, table in parts.items() for label, note in table.columns)
-    lines = {part: {body[0].header: body[0].cells for body in table.bodies} for part, table in parts.items()}
+    lines = {part: {body[0].header: body[0] for body in table.bodies} for part, table in parts.items()}
     first = next(iter(parts.values()))
-    absent = (Cell(ABSENT),) * len(first.columns)
+    absent = Line("", (Cell(ABSENT),) * len(first.columns))
+    rows = {header: line.row for found in lines.values() for header, line in found.items()}
     bodies = tuple(
-        (Line(header, tuple(cell for found in lines.values() for cell in found.get(header, absent))),)
-        for header in dict.fromkeys(header for found in lines.values() for header in found)
+        (Line(header, tuple(c for found in lines.values() for c in found.get(header, absent).cells), row=row),)
+        for header, row in rows.items()
     )
     return replace(first, columns=columns, bodies=bodies)

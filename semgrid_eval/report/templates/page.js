@@ -39,7 +39,7 @@ const element = (kind, properties, ...children) => {
 
   const csv = (table) =>
     [...table.rows]
-      .filter((row) => !row.parentElement.hidden)
+      .filter((row) => !row.closest(".off"))
       .map((row) => [...row.cells].map((cell) => quoted(cell.dataset.sort ?? label(cell))).join(","))
       .join("\n") + "\n";
 
@@ -68,16 +68,7 @@ const element = (kind, properties, ...children) => {
     const tip = element("output", { className: "tip" });
     tools.append(tip);
     table.addEventListener("click", (event) => tell(tip, table, event.target.closest("td[title]")));
-    if (table.tBodies.length > 3) {
-      const find = element("input", { type: "search", placeholder: "Filter rows" });
-      find.setAttribute("aria-label", `Filter rows: ${table.caption.textContent}`);
-      find.oninput = () => {
-        const wanted = find.value.toLowerCase();
-        for (const body of table.tBodies) body.hidden = !body.textContent.toLowerCase().includes(wanted);
-      };
-      tools.append(find);
-    }
-    const save = element("button", { type: "button", onclick: () => download(table, name) }, "Download CSV");
+    const save = element("button", { type: "button", onclick: () => download(table, name) }, "CSV");
     save.setAttribute("aria-label", `Download CSV: ${table.caption.textContent}`);
     tools.append(save);
     holder.prepend(tools);
@@ -96,19 +87,24 @@ const element = (kind, properties, ...children) => {
     cell.append(copy);
   }
 
+  // What scrolls sideways says so, and is reached by keyboard, too.
   const sized = new ResizeObserver((entries) => {
-    for (const canvas of new Set(entries.map((entry) => entry.target.closest(".canvas")))) {
-      if (canvas.scrollWidth > canvas.clientWidth) {
-        canvas.tabIndex = 0; // what scrolls must be reached by keyboard, too
-        canvas.setAttribute("role", "region");
-        canvas.setAttribute("aria-label", canvas.firstElementChild.alt);
-      } else for (const name of ["tabindex", "role", "aria-label"]) canvas.removeAttribute(name);
+    for (const place of new Set(entries.map((entry) => entry.target.closest(".canvas, .scroll")))) {
+      const wide = place.scrollWidth > place.clientWidth, drawing = place.querySelector(":scope > svg");
+      place.parentElement.classList.toggle("wide", wide);
+      if (wide && drawing) Object.assign(place, { tabIndex: 0, role: "region", ariaLabel: drawing.getAttribute("aria-label") });
+      else if (drawing) for (const name of ["tabindex", "role", "aria-label"]) place.removeAttribute(name);
     }
   });
-  for (const canvas of document.querySelectorAll(".canvas")) {
-    sized.observe(canvas);
-    sized.observe(canvas.firstElementChild); // a picture has its size when it is there
-  }
+  for (const place of document.querySelectorAll(".canvas, .scroll")) sized.observe(place);
+
+  // A link to what is folded unfolds it.
+  const unfold = () => {
+    const [id] = location.hash.slice(1).split("&");
+    for (let part = document.getElementById(id); part; part = part.parentElement) if (part.tagName === "DETAILS") part.open = true;
+  };
+  window.addEventListener("hashchange", unfold);
+  unfold();
 
   const links = new Map([...document.querySelectorAll("nav a")].map((link) => [link.hash.slice(1), link]));
   const seen = new IntersectionObserver((entries) => {
@@ -119,5 +115,5 @@ const element = (kind, properties, ...children) => {
   }, { rootMargin: "-15% 0px -75% 0px" });
   document.querySelectorAll("main > section").forEach((section) => seen.observe(section));
 
-  window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((part) => { part.open = true; }));
+  window.addEventListener("beforeprint", () => document.querySelectorAll("details:not(.chooser)").forEach((part) => { part.open = true; }));
 })();

@@ -5,10 +5,9 @@ import pytest
 from support.fake_run import FakeRow, counted_row, make_fake_run
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.report.estimates.bootstrap import Estimate, Resampling, everywhere, score_all
+from semgrid_eval.report.estimates.bootstrap import SEED, Estimate, Resampling, everywhere, score_all
 from semgrid_eval.report.estimates.division import EVERYWHERE
 from semgrid_eval.report.estimates.gate import Gate, Limit, Verdict, check_gate, hold, parse_limit
-from semgrid_eval.report.page import write
 from semgrid_eval.report.rows.load import load_runs
 
 GOOD, BAD = FakeRow("DC", "ED", 0.06, 1), FakeRow("DC", "ED", 0.3, 1)
@@ -59,7 +58,7 @@ def test_differences_are_those_of_a_report_of_both_runs(runs):
     found = gate(runs, "good", "bad", rows=("ED-DC",)).verdicts[0].difference
     loaded = load_runs((runs / "good", runs / "bad"))
     rows = [row for run in loaded for row in run.rows]
-    scores = everywhere(score_all(rows, [EVERYWHERE], Resampling(write._SEED)), "iou")
+    scores = everywhere(score_all(rows, [EVERYWHERE], Resampling(SEED)), "iou")
     one, other = (run.rows[1].name for run in loaded)
     assert found == scores[other].minus(scores[one], "mean_known")
 

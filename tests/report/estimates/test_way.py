@@ -82,12 +82,14 @@ def test_rows_that_look_another_time_ahead_have_no_way(change):
     assert set(shares(rows_of(**change))) == {"new"}
 
 
-def test_rows_of_other_targets_or_runs_have_no_way():
+def test_rows_of_other_targets_have_no_way_and_the_own_runs_ends_come_first():
     rows = rows_of()
     record = rows[1].results[0].record.model_copy(update={"targets": "others"})
     rows[1] = replace(rows[1], results=(replace(rows[1].results[0], record=record),))
     assert way_of(rows[1], rows) is None
-    assert way_of(replace(rows_of()[1], run=rows[0].run / "other"), rows_of()) is None
+    mine = [replace(each, run=each.run / "other") for each in rows_of()]
+    assert way_of(mine[1], [*rows_of(), *mine]) == (mine[0], mine[2])
+    assert way_of(mine[1], rows_of()) is not None
 
 
 def test_there_is_no_way_where_an_end_is_missing_or_is_not_above_the_other():
@@ -135,7 +137,7 @@ def test_the_table_has_shares_of_all_cells_and_near_moving_actors():
     found = {body[0].header: [cell.text for cell in body[0].cells] for body in table.bodies}
     assert table.caption.startswith("Share of the way from BL-DC to top that each row has covered")
     absent = "\N{EN DASH}"
-    assert found["ED-DC"] == ["50%", absent, "50%", absent, "50%", "30%", absent, absent]
+    assert found["ED-DC"] == ["50%", "50%", absent, "50%", absent, "30%", absent, absent]
     assert found["new"][-3:] == [absent] * 3
     assert "from BL-DC 0.500 to top 0.900" in table.bodies[0][0].cells[0].title
     assert way_table(score_rows(rows_of()[:2], np.random.default_rng(0)), {}, []) is None

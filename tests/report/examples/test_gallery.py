@@ -26,15 +26,16 @@ def test_contests_horizons_and_sensors_are_shown_and_explained(seen):
     rows, groups = gallery(seen)
     assert [group.title for group in groups] == [
         "own-DC against BL-DC",
+        "own-DC against BL-DC, more windows",
         "own-DC against BL-DC, class by class",
         "Looking further ahead: own-DC, own-PH1, own-PH2",
         "own-PH1 against BL-PH1",
         "own-Sp2 against BL-Sp2",
     ]
     assert all(group.problem == "" and group.windows for group in groups)
-    assert [group.shown for group in groups] == [True, False, False, False, False]
-    assert groups[2].hint.startswith("Each column asks the same model")
-    assert "Hatched is the ground" in groups[4].hint
+    assert [group.shown for group in groups] == [True, False, False, False, False, False]
+    assert groups[3].hint.startswith("Each column asks the same model")
+    assert "Hatched is the ground" in groups[5].hint
     assert gaps(rows, groups) == []
 
 
@@ -42,13 +43,13 @@ def test_windows_are_read_once_for_contests_that_share_them(run, monkeypatch):
     read = []
     monkeypatch.setattr(gallery_module, "read_windows", lambda *args: read.append(args) or read_windows(*args))
     _, groups = gallery(run)
-    assert [group.title for group in groups][2:] == ["ED-Sp2 against BL-Sp2"]
+    assert [group.title for group in groups][3:] == ["ED-Sp2 against BL-Sp2"]
     assert len(read) == len(set(read)) == 2
 
 
 def test_a_window_of_several_classes_is_shown_once(seen):
     _, groups = gallery(seen)
-    recordings = [window.window.recording for window in groups[1].windows]
+    recordings = [window.window.recording for window in groups[2].windows]
     assert sorted(recordings) == ["toy0", "toy1"]
 
 
@@ -85,7 +86,7 @@ def test_a_run_without_pictures_shows_the_same_windows(seen, tmp_path):
     ]
     shown = [p for group in groups for w in group.windows for column in w.film for p in column.pictures]
     assert {picture.kind for picture in shown} == {"grid"}
-    assert groups[4].hint == "Each input is seen by several sensors."
+    assert groups[5].hint == "Each input is seen by several sensors."
     assert len(gaps(rows, groups)) == 1
 
 

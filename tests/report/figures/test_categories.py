@@ -1,4 +1,5 @@
 import io
+import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ from PIL import Image
 from support.fake_run import FakeRow, counted_row, make_fake_run
 from support.scoring import score_rows
 
-from semgrid_eval.report.figures.categories import category_plots, lay_out
+from semgrid_eval.report.figures.categories import category_plots, horizon_plots, lay_out
 from semgrid_eval.report.figures.style import INK, PALETTE, family_colours
 from semgrid_eval.report.rows.load import load_runs
 
@@ -47,11 +48,11 @@ def _texts(svg):
 
 def test_rows_of_one_question_stand_together_baselines_first_with_gaps_between(scores):
     assert [(group.words, group.places) for group in lay_out(scores)] == [
-        ("2 inputs, front, 0.29 s ahead", {"BL-DC": 0, "ED-DC": 1, "BL-mine": 2}),
+        ("2 inputs, sensor front, 0.29 s ahead", {"BL-DC": 0, "ED-DC": 1, "BL-mine": 2}),
         ("0.59 s ahead", {"ED-PH1": 4}),
         ("inputs not moved to the target's time", {"BL-NT": 6}),
         ("3 inputs", {"ED-SL3": 8}),
-        ("lower + upper", {"ED-Sp2": 10}),
+        ("sensors lower + upper", {"ED-Sp2": 10}),
         ("other targets", {"ED-fine": 12}),
     ]
 
@@ -94,18 +95,38 @@ def test_a_panel_says_what_it_rests_on(scores):
 def test_more_rows_make_a_panel_higher_and_no_wider(scores):
     few, many = (_plot(dict(list(scores.items())[:n])) for n in (2, 8))
     assert few.width_px == many.width_px
-    assert few.height_px < many.height_px
+    few, many = (float(ET.fromstring(plot.svg).get("height").removesuffix("pt")) for plot in (few, many))
+    assert few < many
 
 
 def test_rows_that_the_paper_lacks_have_no_diamonds(scores):
     assert "diamonds" not in _plot({"ED-fine": scores["ED-fine"]}).caption
 
 
-def test_the_themed_drawing_keeps_its_text_and_follows_the_theme(scores):
+def test_the_drawing_in_a_page_keeps_its_text_and_follows_the_theme(scores):
     panel = _plot(scores)
-    assert _texts(panel.themed_svg) == _texts(panel.svg)
-    assert "prefers-color-scheme:dark" in panel.themed_svg
-    assert INK not in panel.themed_svg.split("</style>", 1)[1]
+    inline = panel.inline_svg.replace("xlink:href", "href")  # a page knows the prefix
+    assert list(_texts(inline).values()) == list(_texts(panel.svg).values())
+    assert INK in panel.svg
+    assert INK not in inline
+    assert "var(--ink)" in inline
+    assert "http:" not in inline
+
+
+def test_names_of_parts_of_drawings_are_their_own_on_a_page(scores):
+    names = re.findall(r' id="([^"]*)"', _plot(scores).inline_svg)
+    used = re.findall(r'(?:url\(|href=")#([^)"]*)', _plot(scores).inline_svg)
+    assert set(names) == set(used)
+    assert all(name.startswith("categories-") for name in names)
+
+
+def test_parts_of_a_drawing_tell_their_rows_and_have_ids_of_their_own(tmp_path):
+    rows = tuple(FakeRow(f"PH{at}", "BL", horizon_steps=at) for at in (1, 2))
+    loaded = load_runs([make_fake_run(tmp_path / "run", rows=rows, recordings=2, windows=1)])[0].rows
+    (plot,) = horizon_plots(_scores(loaded))
+    assert 'data-row="1 2"' in plot.inline_svg
+    ids = re.findall(r' id="([^"]*)"', plot.svg)
+    assert len(ids) == len(set(ids))
 
 
 def test_names_in_any_script_are_drawn(scores):

@@ -8,7 +8,7 @@ from support.scoring import score_rows
 
 from semgrid_eval.report.estimates.bootstrap import Estimate
 from semgrid_eval.report.page.provenance import failures
-from semgrid_eval.report.page.write import summarise
+from semgrid_eval.report.page.summary import summarise, title_of
 from semgrid_eval.report.rows.load import Run, load_runs
 from semgrid_eval.report.rows.pairing import comparable, headline, reference_of, verdict
 from semgrid_eval.scores.results import NOT_RUN
@@ -88,14 +88,16 @@ def test_the_summary_says_who_leads_by_how_much_and_on_what_it_rests(run):
     summary = summarise(runs, scores, found)
     lead = scores["ED-DC"].mean["mean_known"] - scores["BL-Fuse"].mean["mean_known"]
     assert summary.sentences[0].startswith(
-        "Of 3 rows with the same targets, inputs and horizon, ED-DC has the highest mean class IoU, "
+        "Like for like (2 inputs, sensor front, 0.29 s ahead; 3 rows), <strong>ED-DC</strong> has the highest mean"
     )
     assert f"+{lead:.3f} over BL-Fuse, the best baseline, clearly better (95% interval +" in summary.sentences[0]
+    assert summary.sentences[1] == "It is also the best of all 6 rows with these targets."
     assert "16 windows from 8 recordings" in summary.sentences[2]
     assert "1 row failed" in summary.sentences[2]
     assert "With so few recordings the intervals are rough." in summary.sentences[2]
     assert summary.sentences[2].endswith("Intervals of rows with 2 seeds leave out much of the chance in training.")
-    assert [tile.label for tile in summary.tiles][-1] == "Mean (known)"
+    assert summary.compared == "ED-DC \N{MINUS SIGN} BL-Fuse"
+    assert (summary.tiles[0].label, summary.tiles[0].value) == ("Mean (known)", f"+{lead:.3f}")
     assert all(0 <= tile.low <= tile.at <= tile.high <= 100 for tile in summary.tiles)
 
 
@@ -115,7 +117,9 @@ def test_what_is_nowhere_is_not_compared():
     rows = [counted_row(name, {"road": [hits] * 12}) for name, hits in (("BL-DC", 50), ("ED-DC", 60))]
     scores = score_rows(rows, np.random.default_rng(0))
     summary = summarise([Run(Path(), "", None, tuple(rows))], scores, headline(scores))
-    assert summary.sentences[1] == "Against BL-DC, ED-DC is clearly better on static (known) (+0.100)."
+    words = {tile.label: (tile.value, tile.word) for tile in summary.tiles}
+    assert words["Static (known)"] == ("+0.100", "clearly better")
+    assert words["Vehicles"] == ("\N{EN DASH}", "absent")
 
 
 def test_only_rows_with_as_many_inputs_are_compared_first():
@@ -123,8 +127,15 @@ def test_only_rows_with_as_many_inputs_are_compared_first():
     facts = more.record.facts.model_copy(update={"inputs": 5})
     more = replace(more, record=more.record.model_copy(update={"facts": facts}))
     rows = [counted_row("BL-DC", {"road": [50] * 12}), counted_row("ED-DC", {"road": [60] * 12}), more]
-    found = headline(score_rows(rows, np.random.default_rng(0)))
+    scores = score_rows(rows, np.random.default_rng(0))
+    found = headline(scores)
     assert (found.best.name, found.rival.name, found.compared) == ("ED-DC", "BL-DC", 2)
+    assert (found.overall.name, found.sharing) == ("ED-SL5", 3)
+    said = summarise([Run(Path(), "", None, tuple(rows))], scores, found).sentences[1]
+    assert said.startswith(
+        "Of all 3 rows with these targets, <strong>ED-SL5</strong> is best, 0.900: +0.300 over ED-DC, "
+    )
+    assert said.endswith("It differs in what it is given or asked: 5 inputs instead of 2 inputs.")
 
 
 def test_rows_are_compared_only_with_the_same_targets_in_whichever_run(rows, tmp_path):
@@ -135,6 +146,23 @@ def test_rows_are_compared_only_with_the_same_targets_in_whichever_run(rows, tmp
     fewer = make_fake_run(tmp_path / "fewer", rows=ROWS[1:2], recordings=2, windows=1)
     assert comparable(by_name["BL-DC"], load_runs([other])[0].rows[0])
     assert not comparable(by_name["BL-DC"], load_runs([fewer])[0].rows[0])
+
+
+def test_a_baseline_of_another_run_is_taken_only_where_the_own_one_has_none(rows, tmp_path):
+    other = make_fake_run(tmp_path / "other", rows=(ROWS[1], ROWS[6]), recordings=3, windows=1)
+    mine = load_runs([other])[0].rows
+    assert reference_of(mine[1], [*rows, *mine]) is mine[0]
+    assert reference_of(mine[1], [*rows, mine[1]]).name == "BL-DC"
+
+
+def test_a_title_tells_runs_apart_in_front(tmp_path):
+    runs = [
+        make_fake_run(tmp_path / name, rows=ROWS[:1], recordings=1, title=title)
+        for name, title in (("first", "Town"), ("other", "Town"), ("third", "City"))
+    ]
+    assert title_of(load_runs(runs[:1])) == "Town"
+    assert title_of(load_runs(runs[:2])) == "first and other: Town"
+    assert title_of(load_runs(runs[1:])) == "other: Town; third: City"
 
 
 def test_a_row_without_a_result_can_be_compared_with_none(rows):

@@ -7,7 +7,8 @@ from support.scoring import score_rows
 
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.report.rows.load import load_runs
-from semgrid_eval.report.tables.scores import changes_table, not_compared_table
+from semgrid_eval.report.tables.scores import changes_table
+from semgrid_eval.report.tables.targets import not_compared_sentence, not_compared_table
 
 MODELS = ("BL", "ED")
 
@@ -24,7 +25,7 @@ def test_each_row_is_set_against_the_closest_one_of_its_model_above_it(run):
         "BL-NT \N{MINUS SIGN} BL-DC",
         "ED-Sp2 \N{MINUS SIGN} ED-DC",
     ]
-    settings, *_, mean = table.bodies[-1][0].cells
+    settings, mean, *_ = table.bodies[-1][0].cells
     assert settings.text == "sensors front to lower, upper"
     assert mean.sort == pytest.approx(scores["ED-Sp2"].mean["mean_known"] - scores["ED-DC"].mean["mean_known"])
     for words in ("16 windows", "2 results", "95% interval"):
@@ -44,7 +45,7 @@ def finer(tmp_path_factory):
 def test_scores_on_other_targets_stand_side_by_side_and_are_not_subtracted(finer):
     (line,) = next(body for body in changes_table(finer).bodies if body[0].header.startswith("ED"))
     assert line.header == "ED-fine beside ED-DC"
-    settings, *_, mean = line.cells
+    settings, mean, *_ = line.cells
     assert settings.text == "grid.cell_m 0.8 to 0.4"
     assert mean.text == f"{finer['ED-fine'].mean['mean_known']:.3f}, {finer['ED-DC'].mean['mean_known']:.3f}"
     assert (mean.note, mean.sort) == ("other targets", None)
@@ -57,6 +58,8 @@ def test_the_page_says_which_rows_are_not_compared_and_why(finer):
     assert line.header == "BL-fine, ED-fine"
     assert line.cells[0].text == "grid.cell_m 0.8 to 0.4 (against BL-DC)"
     assert (line.cells[1].text, line.cells[1].note) == ("4", "4 shared")
+    said = not_compared_sentence([entry.row for entry in finer.values()])
+    assert said.endswith("since their targets are others: BL-fine, ED-fine (grid.cell_m 0.8 to 0.4).")
     assert line.cells[2].text == "\N{EN DASH}", "the size of its cells is not told"
 
 
@@ -86,7 +89,9 @@ def test_logs_that_differ_are_a_reason_not_to_compare(tmp_path):
 
 
 def test_where_all_targets_are_the_same_nothing_is_said(run):
-    assert not_compared_table(score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=2)) is None
+    scores = score_rows(load_runs([run])[0].rows, np.random.default_rng(0), draws=2)
+    assert not_compared_table(scores) is None
+    assert not_compared_sentence([entry.row for entry in scores.values()]) == ""
     assert not_compared_table({}) is None
 
 

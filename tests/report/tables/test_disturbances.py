@@ -39,12 +39,12 @@ def test_each_model_has_a_card_of_what_it_loses(scores):
     table = disturbance_table(scores)
     assert [[line.header for line in body] for body in table.bodies] == [["ED-DC", LATE, LOST], ["BL-plain", LATE]]
     head, late, lost = table.bodies[0]
-    assert head.cells[-1].sort == pytest.approx(scores["ED-DC"].mean["mean_known"])
+    assert head.cells[0].sort == pytest.approx(scores["ED-DC"].mean["mean_known"])
     for line, name in ((late, "ED-late"), (lost, "ED-lost")):
         loss = scores[name].minus(scores["ED-DC"], "mean_known")
-        assert line.cells[-1].sort == loss.value < 0
-        assert (line.cells[-1].tone, line.cells[-1].text[0]) == ("loss", MINUS)
-        assert line.cells[-1].interval == (loss.low, loss.high)
+        assert line.cells[0].sort == loss.value < 0
+        assert (line.cells[0].tone, line.cells[0].text[0]) == ("loss", MINUS)
+        assert line.cells[0].interval == (loss.low, loss.high)
 
 
 def test_without_disturbed_rows_there_is_no_card(rows):

@@ -22,7 +22,8 @@ SHOWN = ("vehicles", "small_dynamic")
 
 @pytest.fixture(scope="module")
 def table(run):
-    return value_table("name", "Caption", score_rows(load_runs([run])[0].rows, 0, draws=20), SHOWN, beside_paper=True)
+    scores = score_rows(load_runs([run])[0].rows, 0, draws=20)
+    return value_table("name", "Caption", scores, SHOWN, on_cityscapes=[run])
 
 
 def named(*headers):
