@@ -136,5 +136,5 @@ def test_real_recordings_are_converted_without_a_finding(tmp_path):
             assert len(log.motion()) == len(frames)
             assert all(frame.label_png is not None for frame in frames)
             first = source / "leftImg8bit_sequence" / log.scene.split
-            assert frames[0].image_png == next(first.glob(f"*/{log.scene.name}_leftImg8bit.png")).read_bytes()
+            assert frames[0].image_file == next(first.glob(f"*/{log.scene.name}_leftImg8bit.png")).read_bytes()
     assert total == len(images)
