@@ -107,7 +107,7 @@ def test_labels_are_sampled_not_mixed_and_have_their_colours():
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff\xe0 a photo", png(np.zeros((9, 9, 3), np.uint8))[:60]])
 def test_what_cannot_be_decoded_is_told(data):
     for small in (small_image, small_label):
-        with pytest.raises(InputError, match="(PNG|JPEG) file"):
+        with pytest.raises(InputError, match=r"(PNG|JPEG) file"):
             small(data)
 
 
