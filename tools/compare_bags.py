@@ -1,8 +1,8 @@
 """Write real recordings as ROS 2 bags, convert them, and hold grids and scores against those of the tree itself.
 
-Prints a table (Markdown): for each way of writing the bags the share of cells that are equal, of all cells and of
-those that either grid knows, and the score of two baselines. Each recording of TREE, a Cityscapes sequence tree,
-becomes a bag of each kind.
+Prints a table (Markdown): for each way of writing the bags the share of cells that are equal, of all cells, of those
+that either grid knows, and of those up to 60 m ahead, and the score of two baselines. Each recording of TREE, a
+Cityscapes sequence tree, becomes a bag of each kind.
 
 Example: PYTHONPATH=.:tests python tools/compare_bags.py TREE --labels TREE/pred_sequence --out build/bags
 """
@@ -10,7 +10,7 @@ Example: PYTHONPATH=.:tests python tools/compare_bags.py TREE --labels TREE/pred
 # ruff: noqa: T201 - what it measures goes to stdout
 
 import argparse
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -40,8 +40,9 @@ rows:
 - {name: BL-DC, model: newest}
 - {name: BL-Fuse, model: fuse}
 """
+SPEC, NEAR_M = sg.GridSpec(), 60.0
 Grids = dict[tuple[str, int], np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]
-"""Grids (F, H, W) by the city and the stretch of a log."""
+"""Grids (S, F, H, W) by the city and the stretch of a log."""
 
 
 def main() -> None:
@@ -62,13 +63,14 @@ def _compare(tree: CityscapesOptions, out: Path) -> None:
     (out / "matrix.yaml").write_text(MATRIX)
     _require_whole(convert_cityscapes(tree, out / "tree"))
     expected = _grids(out / "tree")
-    print("| bag | equal cells | of those that either knows | BL-DC | BL-Fuse |\n|---|---|---|---|---|")
-    print(f"| (the tree itself) | | | {_scores(out, 'tree')} |")
+    print("| bag | equal cells | of those that either knows | of those, up to 60 m | BL-DC | BL-Fuse |")
+    print("|---|---|---|---|---|---|")
+    print(f"| (the tree itself) | | | | {_scores(out, 'tree')} |")
     for number, (what, variant) in enumerate(VARIANTS.items()):
         folder = f"variant{number}"
         _require_whole(_converted(tree, variant, out / folder))
-        equal, known = _equal(_grids(out / folder / "logs"), expected)
-        print(f"| {what} | {equal:.3%} | {known:.3%} | {_scores(out, f'{folder}/logs')} |", flush=True)
+        shares = " | ".join(f"{share:.2%}" for share in _equal(_grids(out / folder / "logs"), expected))
+        print(f"| {what} | {shares} | {_scores(out, f'{folder}/logs')} |", flush=True)
 
 
 def _converted(tree: CityscapesOptions, variant: Variant, folder: Path) -> ConversionSummary:
@@ -95,12 +97,13 @@ def _built(folder: Path) -> Iterator[tuple[tuple[str, int], np.ndarray[tuple[int
             yield (found.name.partition("_")[0], number), found.grids
 
 
-def _equal(found: Mapping[tuple[str, int], np.ndarray], expected: Grids) -> tuple[float, float]:  # type: ignore[type-arg]
-    """Return the share of equal cells, of all, and of those that are known in one or the other."""
+def _equal(found: Grids, expected: Grids) -> tuple[float, ...]:
+    """Return the share of equal cells: of all; of those that one or the other knows; and of those up to 60 m ahead."""
     assert found.keys() == expected.keys()
-    ours, theirs = (np.concatenate([grids[key].ravel() for key in expected]) for grids in (found, expected))
-    known = (ours > 0) | (theirs > 0)
-    return float((ours == theirs).mean()), float((ours == theirs)[known].mean())
+    ours, theirs = (np.concatenate([grids[key][0] for key in expected]) for grids in (found, expected))
+    equal, known = ours == theirs, (ours > 0) | (theirs > 0)
+    near = np.arange(SPEC.rows) >= SPEC.agent_row - NEAR_M / SPEC.cell_m
+    return tuple(float(equal[each].mean()) for each in (known | True, known, known & near[:, None]))
 
 
 def _scores(out: Path, logs: str) -> str:

@@ -12,7 +12,7 @@ from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import WorkerDied, local_executor
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
-from semgrid_eval.recording.disparity import CODING_ERROR_PX
+from semgrid_eval.recording.disparity import CODING_ERROR_PX, LARGEST_PX
 from semgrid_eval.sources.known import Source
 from semgrid_eval.sources.ros2.inspection import inspect_bags
 from semgrid_eval.sources.ros2.mapping import MAP_FILE, BagMap, load_map
@@ -31,6 +31,7 @@ jumps or it is damaged. The others are converted; the exit code is then 1. Logs 
 as they are.
 """
 _LONGEST = "Longest recording in seconds; each bag is cut into equal parts.  0: only where frames are missing."
+_TOLD_AT_M = 50.0
 _MAP = "The map file; with --inspect, the one to write."
 
 
@@ -91,7 +92,7 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
         return ""
     lost = sum((plan.lost for plan in plans), Counter[str]())
     total, kept = sum(plan.frames for plan in plans), sum(len(each.frames) for plan in plans for each in plan.stretches)
-    parts = [f"{kept} of {total} frames; {told(lost)}", f"disparity coded to {CODING_ERROR_PX * 256:g}/256 px"]
+    parts = [f"{kept} of {total} frames; {told(lost)}", *_codings(plans[0])]
     if repeated := sum(plan.repeated for plan in plans):
         parts.append(f"{repeated} messages with a stamp that was there before left out")
     unlabelled = [name for name, camera in mapping.cameras.items() if camera.labels is None]
@@ -99,6 +100,17 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
         command = f"semgrid-eval segment {out} --model NETWORK.onnx --out LABELLED"
         parts.append(f"no labels for {', '.join(unlabelled)}: add them with {command}")
     return "; ".join(parts)
+
+
+def _codings(plan: BagPlan) -> list[str]:
+    """Say for each camera what its depth loses in the coding of logs."""
+    found = []
+    for name, rig in plan.stretches[0].rigs.items():
+        depth_px = rig.calibration.fx_px * rig.calibration.baseline_m  # disparity times depth
+        coded = f"{name}: disparity is rounded by at most 1/{1 / CODING_ERROR_PX:g} px"
+        at_m, nearest_m = _TOLD_AT_M**2 / depth_px * CODING_ERROR_PX, depth_px / LARGEST_PX
+        found.append(f"{coded}, {at_m:.3f} m at {_TOLD_AT_M:g} m; what is nearer than {nearest_m:.2f} m has none")
+    return found
 
 
 SOURCE = Source(

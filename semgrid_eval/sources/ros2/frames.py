@@ -70,14 +70,13 @@ def _piece(arrivals: Arrivals, at: np.intp) -> Piece:
 
 
 def covered(frames: Sequence[FramePlan], motion_ns: Stamps, lost: Counter[str]) -> list[FramePlan]:
-    """Return the frames that have motion before and after them, and near: `lost` counts the others."""
+    """Return the frames that have motion near, before and after them but at the ends; `lost` counts the others."""
     stamps_ns = np.array([frame.stamp_ns for frame in frames], np.int64)
-    after = np.searchsorted(motion_ns, stamps_ns, side="left")
-    before = np.searchsorted(motion_ns, stamps_ns, side="right") - 1
-    inside = (before >= 0) & (after < len(motion_ns))
+    before = np.maximum(np.searchsorted(motion_ns, stamps_ns, side="right") - 1, 0)
+    after = np.minimum(np.searchsorted(motion_ns, stamps_ns, side="left"), len(motion_ns) - 1)
     limit_ns = EXTRAPOLATION_LIMIT_S * _NS_PER_S
-    near = inside & (stamps_ns - motion_ns[np.maximum(before, 0)] <= limit_ns)
-    near &= motion_ns[np.minimum(after, len(motion_ns) - 1)] - stamps_ns <= limit_ns
+    near = np.abs(stamps_ns - motion_ns[before]) <= limit_ns
+    near &= np.abs(motion_ns[after] - stamps_ns) <= limit_ns
     lost["without motion"] += int((~near).sum())
     return [frame for frame, keep in zip(frames, near, strict=True) if keep]
 

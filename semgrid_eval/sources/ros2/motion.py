@@ -71,8 +71,9 @@ def rates_of(motion: MotionMap, speed: Track, turning: Track, imu_turn: Floats |
     Raises:
         InputError: there are fewer than two samples, or one is not finite.
     """
-    stamps_ns, speed_mps = _speed(motion.speed.by, speed)
-    others_ns, yaw_rate = _yaw_rate(motion.turning.by, turning, imu_turn)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused below
+        stamps_ns, speed_mps = _speed(motion.speed.by, speed)
+        others_ns, yaw_rate = _yaw_rate(motion.turning.by, turning, imu_turn)
     if turning.topic == speed.topic:
         return _checked(Rates(stamps_ns, speed_mps, yaw_rate), speed.topic)
     shared_ns = max(stamps_ns[0], others_ns[0]), min(stamps_ns[-1], others_ns[-1])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.recording.disparity import coded_disparity
+from semgrid_eval.recording.disparity import LARGEST_PX, coded_disparity
 from semgrid_eval.recording.png import encode, encode_gray
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame
 from semgrid_eval.sources.matching import SemiGlobalMatching
@@ -102,18 +102,17 @@ class Rig:
 
 
 def depth_as_disparity_px(depth_m: Disparity, calibration: CameraCalibration) -> Disparity:
-    """Return d = f B / Z of a depth image (H, W); 0 where there is no depth."""
-    known = np.isfinite(depth_m) & (depth_m > 0)
-    found = np.zeros(depth_m.shape, np.float32)
-    np.divide(np.float32(calibration.fx_px * calibration.baseline_m), depth_m, out=found, where=known)
-    return found
+    """Return d = f B / Z of a depth image (H, W); 0 where there is no depth, or one too small to be coded."""
+    depth_px = np.float32(calibration.fx_px * calibration.baseline_m)
+    known = np.isfinite(depth_m) & (depth_m >= depth_px / np.float32(LARGEST_PX))
+    return np.divide(depth_px, depth_m, out=np.zeros(depth_m.shape, np.float32), where=known)
 
 
 def _told_px(message: Any) -> Disparity:  # noqa: ANN401
-    """Return what a DisparityImage holds (H, W); 0 where it is invalid: below its least, or not a number."""
+    """Return what a DisparityImage holds (H, W); 0 where it is invalid: not within its limits, or not a number."""
     found = pictures.floats(message.image)
-    least = np.float32(max(message.min_disparity, 0.0))
-    return np.where(np.isfinite(found) & (found >= least), found, np.float32(0))
+    valid = (found >= np.float32(max(message.min_disparity, 0.0))) & (found <= np.float32(LARGEST_PX))
+    return np.where(valid, found, np.float32(0))
 
 
 def _baseline(camera: CameraMap, facts: Facts, projection: NDArray[np.float64], right_info: Info | None) -> float:
