@@ -1,4 +1,8 @@
-"""The motion of the vehicle from odometry, twists and inertial sensors, as samples of speed and yaw rate."""
+"""The motion of the vehicle from odometry, twists and inertial sensors, as samples of speed and yaw rate.
+
+Poses are differentiated as the integrator of logs puts them together again (`EgoMotion`, euler): the speed of a sample
+is that of the step that begins at it, its yaw rate that of the step that ends at it.
+"""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -87,9 +91,10 @@ def _speed(by: str, track: Track) -> tuple[NDArray[np.int64], Floats]:
     stamps_ns, values = _enough(track)
     if by == "twist":
         return stamps_ns, values[:, 0]
-    seconds = _seconds(stamps_ns)
-    ahead, aside = np.gradient(values[:, 0], seconds), np.gradient(values[:, 1], seconds)
-    return stamps_ns, ahead * np.cos(values[:, 2]) + aside * np.sin(values[:, 2])
+    x_m, y_m = np.diff(values[:, 0]), np.diff(values[:, 1])
+    ahead_m = x_m * np.cos(values[:-1, 2]) + y_m * np.sin(values[:-1, 2])
+    speeds = np.copysign(np.hypot(x_m, y_m), ahead_m) / _steps_s(stamps_ns)
+    return stamps_ns, np.append(speeds, speeds[-1])
 
 
 def _yaw_rate(by: str, track: Track, imu_turn: Floats | None) -> tuple[NDArray[np.int64], Floats]:
@@ -98,7 +103,8 @@ def _yaw_rate(by: str, track: Track, imu_turn: Floats | None) -> tuple[NDArray[n
         return stamps_ns, values @ imu_turn
     if by == "twist":
         return stamps_ns, values[:, 1]
-    return stamps_ns, np.gradient(np.unwrap(values[:, 2]), _seconds(stamps_ns))
+    rates = np.diff(np.unwrap(values[:, 2])) / _steps_s(stamps_ns)
+    return stamps_ns, np.insert(rates, 0, rates[0])
 
 
 def _enough(track: Track) -> tuple[NDArray[np.int64], Floats]:
@@ -116,9 +122,9 @@ def _checked(rates: Rates, topic: str) -> Rates:
     return rates
 
 
-def _seconds(stamps_ns: NDArray[np.int64]) -> Floats:
-    """Return stamps in seconds after the first, which keeps their digits."""
-    return np.asarray((stamps_ns - stamps_ns[0]) / _NS_PER_S, np.float64)
+def _steps_s(stamps_ns: NDArray[np.int64]) -> Floats:
+    """Return the steps between stamps, (N,) -> (N - 1,), in seconds."""
+    return np.asarray(np.diff(stamps_ns) / _NS_PER_S, np.float64)
 
 
 def _interpolated(at_ns: NDArray[np.int64], stamps_ns: NDArray[np.int64], values: Floats) -> Floats:
