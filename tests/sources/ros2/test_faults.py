@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.bags import IMAGE, VEHICLE, RecordingBag, Sent, Variant, camera_info, image, kind, matrix, write_bag
+from support.bags import IMAGE, RecordingBag, Sent, Variant, camera_info, image, kind, matrix, write_bag
 from support.toy_world import HEIGHT, START_NS, WIDTH, street
 
 from semgrid_eval.errors import InputError
@@ -170,7 +170,7 @@ def test_a_label_that_the_map_does_not_name(tmp_path):
 
 def test_a_missing_link(tmp_path):
     line = fault(tmp_path, without("/tf_static"))
-    assert line == f"drive: tf: no link from {VEHICLE} to camera_left_optical; there are: none"
+    assert line == "drive: tf: no link from base_link to camera_left_optical; there are: none"
 
 
 def test_a_link_that_moves(tmp_path):
@@ -184,7 +184,7 @@ def test_a_link_that_moves(tmp_path):
     (told,) = (each for each in MESSAGES if each.topic == "/tf_static")
     again = Sent("/tf_static", MESSAGES[-1].received_ns, moved(told.message))
     line = fault(tmp_path, [*MESSAGES, again])
-    assert line == f"drive: tf: the link {VEHICLE} -> camera moves; a sensor has to be fixed"
+    assert line == "drive: tf: the link base_link -> camera moves; a sensor has to be fixed"
 
 
 @pytest.mark.parametrize(
