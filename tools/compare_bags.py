@@ -4,6 +4,10 @@ Prints a table (Markdown): for each way of writing the bags the share of cells t
 that either grid knows, and of those up to 60 m ahead, and the score of two baselines. Each recording of TREE, a
 Cityscapes sequence tree, becomes a bag of each kind.
 
+With --town, a second table holds bags of stereo pairs of a simulated town, matched by the conversion, against the town's
+own logs, which were matched from the same pairs, but for the columns left of the image that the town renders and a
+camera does not have.
+
 Example: PYTHONPATH=.:tests python tools/compare_bags.py TREE --labels TREE/pred_sequence --out build/bags
 """
 
@@ -11,18 +15,22 @@ Example: PYTHONPATH=.:tests python tools/compare_bags.py TREE --labels TREE/pred
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from support.bags import RecordingBag, Variant
+from support.town_pairs import matched_drive
 
 import semgrid_eval as sg
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.log.convert import ConversionSummary, Work
-from semgrid_eval.log.store import find_logs
+from semgrid_eval.log.store import find_logs, write_log
+from semgrid_eval.progress import silent
 from semgrid_eval.sources.cityscapes.tree import CityscapesOptions, convert_cityscapes, find_sequences
 from semgrid_eval.sources.ros2.convert import Ros2Options, convert_bags
+from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
 
 VARIANTS = {
     "DisparityImage; rgb8; Odometry, its twist": Variant(),
@@ -42,7 +50,7 @@ rows:
 """
 SPEC, NEAR_M = sg.GridSpec(), 60.0
 Grids = dict[tuple[str, int], np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]
-"""Grids (S, F, H, W) by the city and the stretch of a log."""
+"""Grids (S, F, H, W) by the name of what was recorded and the stretch of a log."""
 
 
 def main() -> None:
@@ -51,9 +59,12 @@ def main() -> None:
     parser.add_argument("tree", type=Path)
     parser.add_argument("--labels", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--town", type=int, default=0, help="drives through a simulated town")
     options = parser.parse_args()
     try:
         _compare(CityscapesOptions(src=options.tree, labels=options.labels), options.out)
+        if options.town:
+            _compare_town(options.town, options.out / "town")
     except SemgridError as error:
         raise SystemExit(f"Error: {error}") from None
 
@@ -71,6 +82,26 @@ def _compare(tree: CityscapesOptions, out: Path) -> None:
         _require_whole(_converted(tree, variant, out / folder))
         shares = " | ".join(f"{share:.2%}" for share in _equal(_grids(out / folder / "logs"), expected))
         print(f"| {what} | {shares} | {_scores(out, f'{folder}/logs')} |", flush=True)
+
+
+def _compare_town(drives: int, out: Path) -> None:
+    config = SyntheticConfig(
+        recordings=drives, val_share=0.0, towns=1, town_size_m=250.0, duration_s=15.0, stereo="matched"
+    )
+    (out / "matrix.yaml").parent.mkdir(parents=True, exist_ok=True)
+    (out / "matrix.yaml").write_text(MATRIX)
+    bags = []
+    for plan in plan_recordings(config, out / "cache", silent):
+        recording, bag = matched_drive(plan)
+        write_log(replace(recording, split="val"), out / "town" / "val" / f"{plan.name}.mcap")
+        path = out / "bags" / plan.name
+        bags.append(path if path.exists() else bag.write(path))
+    (out / "map.yaml").write_text(bag.variant.map_text)
+    options = Ros2Options(bag=tuple(bags), map=str(out / "map.yaml"))
+    _require_whole(convert_bags(options, out / "logs", Work(workers=1)))
+    shares = " | ".join(f"{share:.2%}" for share in _equal(_grids(out / "logs"), _grids(out / "town")))
+    print(f"\n| (the town itself) | | | | {_scores(out, 'town')} |")
+    print(f"| a right image; mono8; Odometry, its twist | {shares} | {_scores(out, 'logs')} |")
 
 
 def _converted(tree: CityscapesOptions, variant: Variant, folder: Path) -> ConversionSummary:
@@ -94,7 +125,7 @@ def _grids(folder: Path) -> Grids:
 def _built(folder: Path) -> Iterator[tuple[tuple[str, int], np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]]:
     for log in find_logs(folder):
         for number, found in enumerate(build_log(log, sg.GridConfig())):
-            yield (found.name.partition("_")[0], number), found.grids
+            yield ("_".join(found.name.partition("#")[0].split("_")[:3]), number), found.grids
 
 
 def _equal(found: Grids, expected: Grids) -> tuple[float, ...]:

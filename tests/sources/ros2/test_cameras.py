@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 import pytest
-from support.bags import camera_info
+from support.ros_messages import camera_info
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.sources.ros2.cameras import Info, Rectification, baseline_m

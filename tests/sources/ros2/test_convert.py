@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.bags import IMAGE, RecordingBag, Sent, Variant, compressed, write_bag
+from support.bags import IMAGE, RecordingBag, Sent, Variant, write_bag
+from support.ros_messages import compressed
 from support.toy_world import street
 
 from semgrid_eval.grids.build import build_log

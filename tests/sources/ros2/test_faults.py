@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.bags import IMAGE, RecordingBag, Sent, Variant, camera_info, image, kind, matrix, write_bag
+from support.bags import IMAGE, RecordingBag, Sent, Variant, write_bag
+from support.ros_messages import camera_info, image, kind, matrix
 from support.toy_world import HEIGHT, START_NS, WIDTH, street
 
 from semgrid_eval.errors import InputError

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from support.bags import IMAGE, RecordingBag, Sent, Variant, kind, write_bag
+from support.bags import IMAGE, RecordingBag, Sent, Variant, write_bag
+from support.ros_messages import kind
 from support.toy_world import street
 
 from semgrid_eval.cli.main import cli

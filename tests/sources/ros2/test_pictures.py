@@ -3,7 +3,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from support.bags import compressed, image
+from support.ros_messages import compressed, image
 
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import InputError

@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 import pytest
-from support.bags import OPTICAL, camera_info, image, matrix
+from support.ros_messages import OPTICAL, camera_info, image, matrix
 from support.toy_world import HEIGHT, WIDTH, ToyWorld
 
 from semgrid_eval.recording.disparity import decoded_disparity

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.bags import transforms
+from support.ros_messages import transforms
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
