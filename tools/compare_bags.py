@@ -4,9 +4,9 @@ Prints a table (Markdown): for each way of writing the bags the share of cells t
 that either grid knows, and of those up to 60 m ahead, and the score of two baselines. Each recording of TREE, a
 Cityscapes sequence tree, becomes a bag of each kind.
 
-With --town, a second table holds bags of stereo pairs of a simulated town, matched by the conversion, against the town's
-own logs, which were matched from the same pairs, but for the columns left of the image that the town renders and a
-camera does not have.
+With --town, more rows hold bags of stereo pairs of a simulated town, matched by the conversion, against the town's own
+logs, which were matched from the same pairs. The town also renders what lies left of the image, which a camera does not
+have; so grids are compared again without the columns for which that matters.
 
 Example: PYTHONPATH=.:tests python tools/compare_bags.py TREE --labels TREE/pred_sequence --out build/bags
 """
@@ -48,6 +48,8 @@ rows:
 - {name: BL-DC, model: newest}
 - {name: BL-Fuse, model: fuse}
 """
+MARGIN_PX = 64  # of 512 columns
+WITHOUT_MARGIN = sg.GridConfig.model_validate({"sensors": {"full": {"kind": "camera", "left_px": MARGIN_PX}}})
 SPEC, NEAR_M = sg.GridSpec(), 60.0
 Grids = dict[tuple[str, int], np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]
 """Grids (S, F, H, W) by the name of what was recorded and the stretch of a log."""
@@ -85,23 +87,34 @@ def _compare(tree: CityscapesOptions, out: Path) -> None:
 
 
 def _compare_town(drives: int, out: Path) -> None:
-    config = SyntheticConfig(
-        recordings=drives, val_share=0.0, towns=1, town_size_m=250.0, duration_s=15.0, stereo="matched"
-    )
     (out / "matrix.yaml").parent.mkdir(parents=True, exist_ok=True)
     (out / "matrix.yaml").write_text(MATRIX)
-    bags = []
+    _drive(drives, out)
+    options = Ros2Options(bag=tuple(sorted((out / "bags").iterdir())), map=str(out / "map.yaml"))
+    _require_whole(convert_bags(options, out / "logs", Work(workers=1)))
+    print(f"| (a town itself) | | | | {_scores(out, 'town')} |")
+    for what, config in (
+        ("a right image; mono8", sg.GridConfig()),
+        (f"the same, without {MARGIN_PX} columns", WITHOUT_MARGIN),
+    ):
+        shares = " | ".join(
+            f"{share:.2%}" for share in _equal(*(_grids(out / each, config) for each in ("logs", "town")))
+        )
+        scores = _scores(out, "logs") if config is not WITHOUT_MARGIN else " | "
+        print(f"| {what} | {shares} | {scores} |")
+
+
+def _drive(drives: int, out: Path) -> None:
+    """Write logs and bags of drives through a town."""
+    config = SyntheticConfig(
+        recordings=drives, stereo="matched", val_share=0.0, towns=1, town_size_m=250.0, duration_s=15.0
+    )
     for plan in plan_recordings(config, out / "cache", silent):
         recording, bag = matched_drive(plan)
         write_log(replace(recording, split="val"), out / "town" / "val" / f"{plan.name}.mcap")
-        path = out / "bags" / plan.name
-        bags.append(path if path.exists() else bag.write(path))
-    (out / "map.yaml").write_text(bag.variant.map_text)
-    options = Ros2Options(bag=tuple(bags), map=str(out / "map.yaml"))
-    _require_whole(convert_bags(options, out / "logs", Work(workers=1)))
-    shares = " | ".join(f"{share:.2%}" for share in _equal(_grids(out / "logs"), _grids(out / "town")))
-    print(f"\n| (the town itself) | | | | {_scores(out, 'town')} |")
-    print(f"| a right image; mono8; Odometry, its twist | {shares} | {_scores(out, 'logs')} |")
+        if not (out / "bags" / plan.name).exists():
+            bag.write(out / "bags" / plan.name)
+        (out / "map.yaml").write_text(bag.variant.map_text)
 
 
 def _converted(tree: CityscapesOptions, variant: Variant, folder: Path) -> ConversionSummary:
@@ -118,13 +131,15 @@ def _require_whole(summary: ConversionSummary) -> None:
         raise SystemExit(f"Error: {label}: {reason}")
 
 
-def _grids(folder: Path) -> Grids:
-    return dict(_built(folder))
+def _grids(folder: Path, config: sg.GridConfig | None = None) -> Grids:
+    return dict(_built(folder, config or sg.GridConfig()))
 
 
-def _built(folder: Path) -> Iterator[tuple[tuple[str, int], np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]]:
+def _built(
+    folder: Path, config: sg.GridConfig
+) -> Iterator[tuple[tuple[str, int], np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]]:
     for log in find_logs(folder):
-        for number, found in enumerate(build_log(log, sg.GridConfig())):
+        for number, found in enumerate(build_log(log, config)):
             yield ("_".join(found.name.partition("#")[0].split("_")[:3]), number), found.grids
 
 
