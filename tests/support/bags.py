@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from support import ros_messages as ros
 
 from semgrid_eval.motion import EgoMotion
@@ -29,9 +29,11 @@ class Sent(NamedTuple):
     message: Any
 
 
-def write_bag(path: Path, messages: Iterable[Sent], storage: str = "mcap") -> Path:
-    """Write a bag folder, and return it."""
-    with Writer(path, version=9, storage_plugin=STORAGES[storage]) as writer:
+def write_bag(path: Path, messages: Iterable[Sent], storage: str = "mcap", packed: str = "NONE") -> Path:
+    """Write a bag folder, and return it; `packed` is a mode of compression: FILE, MESSAGE, or STORAGE (mcap)."""
+    writer = Writer(path, version=9, storage_plugin=STORAGES[storage])
+    writer.set_compression(CompressionMode[packed], CompressionFormat.ZSTD)
+    with writer:
         connections: dict[str, Any] = {}
         for topic, received_ns, message in messages:
             if topic not in connections:

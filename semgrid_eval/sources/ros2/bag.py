@@ -2,16 +2,17 @@
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from functools import cache
+from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
 
 from semgrid_eval.errors import InputError
 
-_TYPES = get_typestore(Stores.ROS2_HUMBLE)
-"""Definitions of the standard messages, which are the same in all ROS 2 releases that write bags of these versions."""
 _SHOWN = 200
 _CUT_OFF = ("end magic is invalid", "Truncated record", "Invalid MCAP footer", "disk image is malformed")
 _ADVICE = "; it was cut off while it was recorded or copied: recover it (mcap recover, sqlite3 .recover) and try again"
@@ -20,7 +21,6 @@ _ADVICE = "; it was cut off while it was recorded or copied: recover it (mcap re
 class Topic(NamedTuple):
     """What a bag says of a topic."""
 
-    name: str
     type: str  # such as sensor_msgs/msg/Image
     messages: int
 
@@ -55,25 +55,14 @@ class Bag:
     def __exit__(self, *_: object) -> None:
         self._reader.close()
 
-    @property
-    def name(self) -> str:
-        """What its recordings are called."""
-        path = self.path.resolve()
-        return path.name if path.is_dir() else path.stem
-
     def topics(self) -> dict[str, Topic]:
-        """Return all topics by name, sorted.
-
-        Raises:
-            InputError: messages of two types were recorded on one topic.
-        """
-        found: dict[str, Topic] = {}
-        for each in sorted(self._reader.connections, key=lambda each: each.topic):
-            known = found.get(each.topic, Topic(each.topic, each.msgtype, 0))
-            if known.type != each.msgtype:
-                raise InputError(f"holds {known.type} and {each.msgtype}", path=self.path, field=each.topic)
-            found[each.topic] = known._replace(messages=known.messages + each.msgcount)
-        return found
+        """Return all topics by name, sorted; one with messages of two types names both."""
+        by_name = sorted(self._reader.connections, key=lambda each: each.topic)
+        grouped = {name: list(same) for name, same in groupby(by_name, key=lambda each: each.topic)}
+        return {
+            name: Topic(" and ".join(sorted({each.msgtype for each in same})), sum(each.msgcount for each in same))
+            for name, same in grouped.items()
+        }
 
     @property
     def span_ns(self) -> tuple[int, int]:
@@ -98,7 +87,19 @@ class Bag:
     def decode(self, arrival: Arrival, kind: str) -> Any:  # noqa: ANN401 - a class that rosbags makes
         """Return the message of an arrival of a type, such as sensor_msgs/msg/Image."""
         with _damage_as_input_error(self.path, arrival):
-            return _TYPES.deserialize_cdr(arrival.data, kind)
+            return _types().deserialize_cdr(arrival.data, kind)
+
+
+def name_of(path: Path) -> str:
+    """Return what the recordings of a bag are called: as its folder, or its file without ending."""
+    path = path.resolve()
+    return path.name if path.is_dir() else path.stem
+
+
+@cache
+def _types() -> Typestore:
+    """Return the standard messages, which are the same in all releases of ROS 2 that write bags of these versions."""
+    return get_typestore(Stores.ROS2_HUMBLE)
 
 
 @contextmanager

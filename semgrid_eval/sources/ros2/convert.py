@@ -14,6 +14,7 @@ from semgrid_eval.executors import WorkerDied, local_executor
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.recording.disparity import CODING_ERROR_PX, LARGEST_PX
 from semgrid_eval.sources.known import Source
+from semgrid_eval.sources.ros2.bag import name_of
 from semgrid_eval.sources.ros2.inspection import inspect_bags
 from semgrid_eval.sources.ros2.mapping import MAP_FILE, BagMap, load_map
 from semgrid_eval.sources.ros2.plan import BagPlan, Cut, plan_bag, told
@@ -69,7 +70,7 @@ def _plans(bags: Sequence[Path], mapping: BagMap, cut: Cut, work: Work) -> list[
     with work.stage("scan") as progress:
         scans = local_executor(work.workers).run(partial(plan_bag, mapping=mapping, cut=cut), bags)
         for done, (index, plan) in enumerate(scans, start=1):
-            name = bags[index].stem
+            name = name_of(bags[index])
             found[index] = BagPlan(name, fault=plan.reason) if isinstance(plan, WorkerDied) else plan
             progress(done, len(bags), name)
     return [found[index] for index in sorted(found)]

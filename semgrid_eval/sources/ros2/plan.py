@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.sources.ros2.bag import Bag
+from semgrid_eval.sources.ros2.bag import Bag, name_of
 from semgrid_eval.sources.ros2.frames import FramePlan, covered, frames_of, stretches
 from semgrid_eval.sources.ros2.kinds import IMU
 from semgrid_eval.sources.ros2.mapping import BagMap
@@ -39,12 +39,13 @@ class BagPlan:
 
 def plan_bag(path: Path, mapping: BagMap, cut: Cut) -> BagPlan:
     """Read a bag once, and plan its recordings; what is wrong with it is its fault, and others go on."""
+    plan = BagPlan(name_of(path))
     try:
         with Bag(path) as bag:
-            plan = BagPlan(bag.name)
             facts = scan(bag, mapping)
     except InputError as error:
-        return BagPlan(path.stem or path.name, fault=str(error))
+        plan.fault = str(error)
+        return plan
     try:
         _fill(plan, path, mapping, cut, facts)
     except InputError as error:

@@ -37,7 +37,12 @@ class Stretch:
     def digest(self) -> str:
         """Digest what determines the content; pictures count by the digests of their messages."""
         rigs = {
-            name: [asdict(each.calibration), asdict(each.info), each.camera.model_dump()]
+            name: [
+                asdict(each.calibration),
+                asdict(each.info),
+                each.right_info and asdict(each.right_info),
+                each.camera.model_dump(),
+            ]
             for name, each in self.rigs.items()
         }
         frames = [

@@ -66,14 +66,12 @@ def scan(bag: Bag, mapping: BagMap) -> Facts:
     """
     wanted = list(uses_of(mapping))
     found = _types(bag, wanted)
-    tf = [topic for topic in mapping.vehicle.tf if topic in found]
-    wanted += [Use(topic, "tf") for topic in tf]
+    wanted += [Use(topic, "tf") for topic in mapping.vehicle.tf if topic in found]
     for use in wanted:
         _require_type(bag, use, found[use.topic])
     scanner = _Scanner(bag, mapping, wanted, found)
-    for topic in tf:  # one after the other, since what is heard first counts
-        scanner.read({topic})
-    scanner.read({use.topic for use in wanted} - set(tf))
+    for arrival in bag.arrivals({use.topic for use in wanted}):
+        scanner.take(arrival)
     return scanner.close()
 
 
@@ -88,13 +86,12 @@ class _Scanner:
         self._facts = Facts(kinds={topic: types[topic] for topic in self._uses})
         self._ledgers: dict[str, Ledger] = {}
 
-    def read(self, topics: set[str]) -> None:
-        for arrival in self._bag.arrivals(topics):
-            message = self._bag.decode(arrival, self._facts.kinds[arrival.topic])
-            try:
-                self._take(arrival, message)
-            except InputError as error:
-                raise InputError(str(error), path=self._bag.path) from error
+    def take(self, arrival: Arrival) -> None:
+        message = self._bag.decode(arrival, self._facts.kinds[arrival.topic])
+        try:
+            self._take(arrival, message)
+        except InputError as error:
+            raise InputError(str(error), path=self._bag.path) from error
 
     def close(self) -> Facts:
         for topic, names in self._uses.items():
@@ -111,7 +108,7 @@ class _Scanner:
     def _take(self, arrival: Arrival, message: Any) -> None:  # noqa: ANN401 - a class that rosbags makes
         names = self._uses[arrival.topic]
         if names == ["tf"]:
-            self._facts.transforms.add(message)
+            self._facts.transforms.add(message, self._mapping.vehicle.tf.index(arrival.topic))
             return
         stamp_ns = stamp_of(message) if self._mapping.clock == "header" else arrival.received_ns
         self._facts.frames.setdefault(arrival.topic, frame_of(message))

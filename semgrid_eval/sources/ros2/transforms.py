@@ -13,19 +13,25 @@ _STILL_M, _STILL = 1e-3, 1e-3  # how much a link may change, its rotation in ele
 
 
 class Transforms:
-    """The links between frames that a bag tells; each is what was heard first, and some are known to move."""
+    """The links between frames that a bag tells; each is what was heard first, and some are known to move.
+
+    Of topics, the one with the lowest rank counts, whenever it is heard.
+    """
 
     def __init__(self) -> None:
         self._links: dict[tuple[str, str], SE3] = {}
+        self._ranks: dict[tuple[str, str], int] = {}
         self._moving: set[tuple[str, str]] = set()
 
-    def add(self, message: Any) -> None:  # noqa: ANN401 - a class that rosbags makes
-        """Take in a TFMessage."""
+    def add(self, message: Any, rank: int = 0) -> None:  # noqa: ANN401 - a class that rosbags makes
+        """Take in a TFMessage of a topic of that rank."""
         for each in message.transforms:
             key = (_plain(each.header.frame_id), _plain(each.child_frame_id))
-            found = _se3(each.transform)
-            known = self._links.setdefault(key, found)
-            if known is not found and not _same(known, found):
+            known_by = self._ranks.get(key)
+            if known_by is None or rank < known_by:
+                self._links[key], self._ranks[key] = _se3(each.transform), rank
+                self._moving.discard(key)
+            elif rank == known_by and not _same(self._links[key], _se3(each.transform)):
                 self._moving.add(key)
 
     def lookup(self, parent: str, child: str) -> SE3:

@@ -116,6 +116,17 @@ def test_a_single_file_gives_the_same_log_as_its_folder(tmp_path):
     assert (tmp_path / "mcap/again/val" / log.name).read_bytes() == log.read_bytes()
 
 
+@pytest.mark.parametrize(
+    ("storage", "packed"), [("mcap", "STORAGE"), ("mcap", "MESSAGE"), ("sqlite3", "MESSAGE"), ("sqlite3", "FILE")]
+)
+def test_packed_bags_give_the_same_log(tmp_path, storage, packed):
+    _, (expected,) = converted(tmp_path)
+    write_bag(tmp_path / "packed" / "drive", RecordingBag(WORLD.recording()).messages(), storage, packed)
+    options = Ros2Options(bag=(tmp_path / "packed" / "drive",), map=str(tmp_path / "map.yaml"))
+    convert_bags(options, tmp_path / "again")
+    assert (tmp_path / "again" / "val" / expected.name).read_bytes() == expected.read_bytes()
+
+
 def test_a_second_conversion_leaves_logs_as_they_are_until_the_bag_changes(tmp_path):
     converted(tmp_path)
     options = Ros2Options(bag=(tmp_path / "drive",), map=str(tmp_path / "map.yaml"))

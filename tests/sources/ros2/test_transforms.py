@@ -48,6 +48,13 @@ def test_links_elsewhere_may_move():
         known.lookup("odom", "camera")
 
 
+def test_static_transforms_count_even_where_they_come_late():
+    known = Transforms()
+    for x, rank in ((0.0, 1), (0.5, 1), (1.0, 0), (7.0, 1)):
+        known.add(transforms(("base_link", "camera", np.eye(3), (x, 0, 0))), rank)
+    assert known.lookup("base_link", "camera").translation_m[0] == 1
+
+
 def test_a_rotation_by_nothing_is_refused():
     message = transforms(("a", "b", np.eye(3), (0, 0, 0)))
     message.transforms[0].transform.rotation.w = 0.0
