@@ -1,9 +1,10 @@
 """Which pictures make a frame, and which frames make a recording: by stamps alone."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,10 @@ class FramePlan:
     camera: str
     stamp_ns: int
     pieces: dict[str, Piece]
+
+    def described(self) -> list[Any]:
+        """Return as JSON what determines the frame: its pictures count by the digests of their messages."""
+        return [self.camera, self.stamp_ns, {what: piece.digest for what, piece in self.pieces.items()}]
 
 
 def frames_of(
@@ -71,7 +76,7 @@ def _piece(arrivals: Arrivals, at: np.intp) -> Piece:
 
 def covered(frames: Sequence[FramePlan], motion_ns: Stamps, lost: Counter[str]) -> list[FramePlan]:
     """Return the frames that have motion near, before and after them but at the ends; `lost` counts the others."""
-    stamps_ns = np.array([frame.stamp_ns for frame in frames], np.int64)
+    stamps_ns = _stamps(frames)
     before = np.maximum(np.searchsorted(motion_ns, stamps_ns, side="right") - 1, 0)
     after = np.minimum(np.searchsorted(motion_ns, stamps_ns, side="left"), len(motion_ns) - 1)
     limit_ns = EXTRAPOLATION_LIMIT_S * _NS_PER_S
@@ -89,21 +94,32 @@ def stretches(
     Windows count frames, so no recording may have a hole. Each stretch comes with the number of its first frame, as
     the first camera counts them. `lost` counts the frames of stretches of a single frame.
     """
-    numbers, *others = [np.array([each.stamp_ns for each in frames], np.int64) for frames in by_camera.values()]
+    numbers, *others = [_stamps(frames) for frames in by_camera.values()]
     cuts_ns = {cut_ns for stamps_ns in (numbers, *others) for cut_ns in _holes(stamps_ns)}
     everything = sorted((each for frames in by_camera.values() for each in frames), key=_order)
-    if not everything:
-        return []
-    ends_ns = (everything[0].stamp_ns, *sorted(cuts_ns), everything[-1].stamp_ns + 1)
+    stamps_ns = _stamps(everything)
     found = []
-    for start_ns, end_ns in (part for pair in pairwise(ends_ns) for part in _parts(*pair, longest_s)):
-        frames = [each for each in everything if start_ns <= each.stamp_ns < end_ns]
+    for span_ns in _spans(stamps_ns, cuts_ns, longest_s):
+        start, end = np.searchsorted(stamps_ns, span_ns)
+        frames = everything[start:end]
         counts = Counter(each.camera for each in frames)
         if all(counts[camera] >= _LEAST_FRAMES for camera in by_camera):
             found.append((int(np.searchsorted(numbers, frames[0].stamp_ns)), frames))
         else:
             lost["alone between holes"] += len(frames)
     return found
+
+
+def _stamps(frames: Sequence[FramePlan]) -> Stamps:
+    return np.array([frame.stamp_ns for frame in frames], np.int64)
+
+
+def _spans(stamps_ns: Stamps, cuts_ns: Iterable[int], longest_s: float) -> Iterator[tuple[int, int]]:
+    """Iterate over spans (ends exclusive) between cuts, in parts that are not too long."""
+    if len(stamps_ns):
+        ends_ns = (int(stamps_ns[0]), *sorted(cuts_ns), int(stamps_ns[-1]) + 1)
+        for start_ns, end_ns in pairwise(ends_ns):
+            yield from _parts(start_ns, end_ns, longest_s)
 
 
 def _order(frame: FramePlan) -> tuple[int, str]:

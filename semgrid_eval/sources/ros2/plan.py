@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -57,20 +58,13 @@ def _fill(plan: BagPlan, path: Path, mapping: BagMap, cut: Cut, facts: Facts) ->
     rates = _rates(mapping, facts)
     rigs = {name: plan_rig(camera, mapping.vehicle, facts) for name, camera in mapping.cameras.items()}
     by_camera = _frames(plan, mapping, facts, rates)
+    stretch = partial(
+        Stretch, bag=path, split=cut.split, group=plan.name, clock=mapping.clock, kinds=facts.kinds, rigs=rigs
+    )
     for first, frames in stretches(by_camera, cut.longest_s, plan.lost):
-        plan.stretches.append(
-            Stretch(
-                bag=path,
-                name=f"{plan.name}_{first:06d}",
-                split=cut.split,
-                group=plan.name,
-                clock=mapping.clock,
-                kinds=facts.kinds,
-                rigs=rigs,
-                frames=tuple(frames),
-                motion=rates.between(frames[0].stamp_ns, frames[-1].stamp_ns),
-            )
-        )
+        motion = rates.between(frames[0].stamp_ns, frames[-1].stamp_ns)
+        name = f"{plan.name}_{first:06d}"
+        plan.stretches.append(stretch(name=name, frames=tuple(frames), motion=motion))
     if not plan.stretches:
         raise InputError(f"gives no recording; {told(plan.lost)}")
 

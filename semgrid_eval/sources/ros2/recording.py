@@ -1,8 +1,8 @@
 """One stretch of a bag as a recording: the second pass, over its own part of the bag."""
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_value
-from semgrid_eval.recording.types import Moment, MotionSample, Recording
+from semgrid_eval.recording.types import CameraFrame, Moment, MotionSample, Recording
 from semgrid_eval.sources.ros2.bag import Arrival, Bag
 from semgrid_eval.sources.ros2.frames import FramePlan, Piece
 from semgrid_eval.sources.ros2.rig import Rig, RigPlan
@@ -36,19 +36,8 @@ class Stretch:
 
     def digest(self) -> str:
         """Digest what determines the content; pictures count by the digests of their messages."""
-        rigs = {
-            name: [
-                asdict(each.calibration),
-                asdict(each.info),
-                each.right_info and asdict(each.right_info),
-                each.camera.model_dump(),
-            ]
-            for name, each in self.rigs.items()
-        }
-        frames = [
-            [each.camera, each.stamp_ns, {what: piece.digest for what, piece in each.pieces.items()}]
-            for each in self.frames
-        ]
+        rigs = {name: rig.described() for name, rig in self.rigs.items()}
+        frames = [frame.described() for frame in self.frames]
         motion = [[each.stamp_ns, each.speed_mps, each.yaw_rate_radps] for each in self.motion]
         return digest_value([_CONVERSION_VERSION, self.name, self.split, self.group, rigs, frames, motion])
 
@@ -72,15 +61,18 @@ def moments(stretch: Stretch) -> Iterator[Moment]:
         InputError: the bag is not what it was in the first pass, or a picture is damaged.
     """
     rigs = {name: Rig(plan) for name, plan in stretch.rigs.items()}
-    coming = list(stretch.motion)
+    coming = deque(stretch.motion)
     for stamp_ns, frames in groupby(_gathered(stretch), key=lambda each: each[0].stamp_ns):
         cameras = {plan.camera: _made(stretch, rigs[plan.camera], plan, found) for plan, found in frames}
-        count = sum(1 for each in coming if each.stamp_ns <= stamp_ns)
-        yield Moment(stamp_ns, cameras, tuple(coming[:count]))
-        del coming[:count]
+        yield Moment(stamp_ns, cameras, tuple(_until(stamp_ns, coming)))
 
 
-def _made(stretch: Stretch, rig: Rig, plan: FramePlan, messages: dict[str, Any]) -> Any:  # noqa: ANN401
+def _until(stamp_ns: int, coming: deque[MotionSample]) -> Iterator[MotionSample]:
+    while coming and coming[0].stamp_ns <= stamp_ns:
+        yield coming.popleft()
+
+
+def _made(stretch: Stretch, rig: Rig, plan: FramePlan, messages: dict[str, Any]) -> CameraFrame:
     try:
         return rig.frame(plan.stamp_ns, messages)
     except InputError as error:

@@ -1,7 +1,7 @@
 """One camera of a bag: its calibration, and frames of the log made of its messages."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,11 @@ class RigPlan:
     calibration: CameraCalibration
     info: Info
     right_info: Info | None
+
+    def described(self) -> list[Any]:
+        """Return as JSON what determines the frames, but for the messages."""
+        infos = [None if each is None else asdict(each) for each in (self.info, self.right_info)]
+        return [self.camera.model_dump(mode="json"), asdict(self.calibration), *infos]
 
 
 def plan_rig(camera: CameraMap, vehicle: VehicleMap, facts: Facts) -> RigPlan:
