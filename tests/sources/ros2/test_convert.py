@@ -6,17 +6,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.bags import IMAGE, RecordingBag, Sent, Variant, write_bag
-from support.ros_messages import compressed
-from support.toy_world import street
+from support.onnx_models import colour_network
+from support.ros_messages import camera_info, compressed, matrix
+from support.toy_world import HEIGHT, WIDTH, street
 
+from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.log.check import check_log
 from semgrid_eval.log.convert import Work
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs, write_log
-from semgrid_eval.recording.colour import decode_colour
+from semgrid_eval.recording.colour import decode_colour, kind_of
 from semgrid_eval.recording.disparity import decoded_disparity
 from semgrid_eval.recording.png import decode_gray
+from semgrid_eval.segmentation.config import SegmentationConfig
+from semgrid_eval.segmentation.relabel import segment_logs
+from semgrid_eval.sources.ros2.cameras import Info, Rectification
 from semgrid_eval.sources.ros2.convert import Ros2Options, convert_bags
 
 FRAMES = 6
@@ -75,9 +81,37 @@ def test_files_are_stored_as_they_come(tmp_path):
     sent = [bytes(each.message.data) for each in bag.messages() if each.topic == IMAGE]
     _, (log,) = converted(tmp_path, bag.variant)
     assert [frame.image_file for frame in frames_of(log)] == sent
-    with LogReader(log) as reader:
-        (schema,) = {reader.schemas()["/camera/front/image"]}
-    assert schema == "foxglove.CompressedImage"
+    assert check_log(log).findings == ()
+    assert segmented(tmp_path, log) == {LABEL_ID["road"]}
+
+
+def segmented(here, log):
+    """Label a log by a network that sees road everywhere, and return its label ids."""
+    model = colour_network(here / "road.onnx", colours={0: (0.0, 0.0, 0.0)})
+    assert segment_logs([log], model, SegmentationConfig(), here / "labelled").failed == {}
+    (labelled,) = find_logs(here / "labelled")
+    return {int(each) for frame in frames_of(labelled) for each in np.unique(decode_gray(frame.label_png, bit_depth=8))}
+
+
+def test_raw_images_are_rectified_and_stored_without_loss(tmp_path):
+    lens = (-0.2, 0.05, 0.0, 0.0, 0.0)
+    k = matrix(WORLD.calibration())
+    bag = RecordingBag(WORLD.recording(), Variant(image="jpeg", depth="16UC1"))
+    messages = [
+        each._replace(message=camera_info(1, (WIDTH, HEIGHT), k, d=lens)) if "left/camera_info" in each.topic else each
+        for each in bag.messages()
+    ]
+    text = bag.variant.map_text.replace("rectified: true", "rectified: false")
+    _, (log,) = converted(tmp_path, messages=messages, text=text)
+    rectification = Rectification(Info.of(camera_info(1, (WIDTH, HEIGHT), k, d=lens)), rectified=False)
+    photos = [decode_colour(bytes(each.message.data)) for each in messages if each.topic == IMAGE]
+    for frame, photo, expected in zip(frames_of(log), photos, originals(), strict=True):
+        assert kind_of(frame.image_file) == "png"
+        assert np.array_equal(decode_colour(frame.image_file), rectification.apply(photo, "bilinear"))
+        labels = decode_gray(expected.label_png, bit_depth=8).astype(np.uint8)
+        found = decode_gray(frame.label_png, bit_depth=8)
+        assert np.array_equal(found, rectification.apply(labels, "nearest"))
+        assert not np.array_equal(found, labels)
 
 
 @pytest.mark.parametrize(("depth", "error_m"), [("32FC1", 0.0), ("16UC1", 5e-4), ("compressedDepth", 5e-4)])
