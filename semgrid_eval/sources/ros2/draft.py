@@ -1,15 +1,11 @@
 """A first map file, guessed from types and names, with comments on what was guessed."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
-
-from semgrid_eval.sources.ros2 import kinds
-from semgrid_eval.sources.ros2.pictures import require_coding
-
-if TYPE_CHECKING:
-    from semgrid_eval.sources.ros2.inspection import Contents, Seen
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.sources.ros2 import kinds
+from semgrid_eval.sources.ros2.contents import Contents, Seen
+from semgrid_eval.sources.ros2.pictures import require_coding
 
 _LABEL_WORDS = ("label", "segment", "semantic", "/seg", "_seg")
 _RIGHT_WORDS = ("right", "infra2", "cam1")
@@ -19,7 +15,7 @@ _VEHICLE_FRAMES = ("base_link", "base_footprint", "ego_vehicle", "vehicle")
 _VIRTUAL_BASELINE_M = 0.5
 
 
-def draft_map(contents: "Contents") -> str:
+def draft_map(contents: Contents) -> str:
     """Return a map file as text; what could not be guessed is left open there, and says so."""
     vehicle = _vehicle_frame(contents)
     lines = [
@@ -36,13 +32,13 @@ def draft_map(contents: "Contents") -> str:
     return "\n".join(lines) + "\n"
 
 
-def _vehicle_frame(contents: "Contents") -> str:
+def _vehicle_frame(contents: Contents) -> str:
     children = [seen.child for seen in contents.topics.values() if seen.kind == kinds.ODOMETRY and seen.child]
     known = [name for name in _VEHICLE_FRAMES if name in contents.transforms.frames]
     return next(iter([*known, *children]), _VEHICLE_FRAMES[0])
 
 
-def _motion(contents: "Contents", vehicle: str) -> Iterator[str]:
+def _motion(contents: Contents, vehicle: str) -> Iterator[str]:
     odometry, twists, imus = (_of_kind(contents, kind) for kind in (kinds.ODOMETRY, kinds.TWIST, kinds.IMU))
     yield "motion:"
     if odometry or twists:
@@ -56,7 +52,7 @@ def _motion(contents: "Contents", vehicle: str) -> Iterator[str]:
         yield f"  yaw_rate: {{topic: {imus[0]}, aligned: {'false' if is_linked else 'true'}}}{note}"
 
 
-def _camera(contents: "Contents", vehicle: str) -> Iterator[str]:
+def _camera(contents: Contents, vehicle: str) -> Iterator[str]:
     found = _Pictures(contents)
     yield "  front:"
     if found.image:
@@ -78,7 +74,7 @@ def _camera(contents: "Contents", vehicle: str) -> Iterator[str]:
 class _Pictures:
     """Which topics look like the pictures of a camera."""
 
-    def __init__(self, contents: "Contents") -> None:
+    def __init__(self, contents: Contents) -> None:
         self._contents = contents
         self.disparity = next(iter(_of_kind(contents, kinds.DISPARITY)), "")
         labels = [name for name in self._readable("labels") if _has_word(name, _LABEL_WORDS)]
@@ -150,7 +146,7 @@ class _Pictures:
         return (told.width, told.height) == (seen.shape.width, seen.shape.height)
 
 
-def _can_be(use: str, seen: "Seen") -> bool:
+def _can_be(use: str, seen: Seen) -> bool:
     assert seen.shape is not None
     try:
         require_coding(use, seen.shape.coding)
@@ -159,7 +155,7 @@ def _can_be(use: str, seen: "Seen") -> bool:
     return True
 
 
-def _of_kind(contents: "Contents", kind: str) -> list[str]:
+def _of_kind(contents: Contents, kind: str) -> list[str]:
     return [name for name, seen in contents.topics.items() if seen.kind == kind and seen.count]
 
 
@@ -172,7 +168,7 @@ def _preference(name: str) -> tuple[bool, bool, bool, str]:
     return "rect" not in name, "mono" in name, name.endswith("compressed"), name
 
 
-def _is_rectified(topic: str, contents: "Contents", info: str) -> bool:
+def _is_rectified(topic: str, contents: Contents, info: str) -> bool:
     """Tell by its name, or by a calibration without distortion, whether an image is rectified."""
     told = contents.topics[info].info if info else None
     return "rect" in topic.lower() or topic == "" or (told is not None and not any(told.d))
