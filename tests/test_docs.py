@@ -116,7 +116,7 @@ def test_python_of_the_readme_runs(tmp_path, monkeypatch):
         *("README.md", "ARCHITECTURE.md", "reports/README.md"),
         *("docs/performance.md", "docs/readings.md", "docs/town.md", "docs/remedies.md", "docs/disturbances.md"),
         *("docs/ceiling.md", "docs/network.md", "docs/model-card.md", "docs/check.md", "docs/latency.md"),
-        *("docs/streaming.md", "docs/predictions.md", "docs/own-car.md"),
+        *("docs/streaming.md", "docs/predictions.md"),
     ],
 )
 def test_links_and_files_that_a_page_names_exist(page):

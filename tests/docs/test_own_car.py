@@ -18,7 +18,7 @@ from semgrid_eval.scores.results import read_run
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.sources.ros2.mapping import load_map
 
-PAGE = (Path(__file__).parents[1] / "docs" / "own-car.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "own-car.md").read_text(encoding="utf-8")
 YAML = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
 LINES = [line for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL) for line in block.splitlines()]
 COMMANDS = [line for line in LINES if line.startswith("semgrid-eval ")]
@@ -78,7 +78,7 @@ def test_the_long_map_of_the_page_is_one(workplace):
 
 
 def test_what_the_page_says_is_refused_is_what_the_tests_of_bags_expect():
-    tested = (Path(__file__).parent / "sources" / "ros2" / "test_faults.py").read_text(encoding="utf-8")
+    tested = (Path(__file__).parents[1] / "sources" / "ros2" / "test_faults.py").read_text(encoding="utf-8")
     shown = re.findall(r"^\| [^|]+ \| `+(.+?)`+ \|$", PAGE[PAGE.index("## What is refused") :], re.MULTILINE)
     assert len(shown) == 11
     for line in shown:
