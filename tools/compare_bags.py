@@ -29,7 +29,8 @@ from semgrid_eval.log.convert import ConversionSummary, Work
 from semgrid_eval.log.store import find_logs, write_log
 from semgrid_eval.progress import silent
 from semgrid_eval.sources.cityscapes.tree import CityscapesOptions, convert_cityscapes, find_sequences
-from semgrid_eval.sources.ros2.convert import Ros2Options, convert_bags
+from semgrid_eval.sources.ros2.convert import convert_bags
+from semgrid_eval.sources.ros2.options import Ros2Options
 from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recordings
 
 VARIANTS = {

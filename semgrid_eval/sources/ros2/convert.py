@@ -4,45 +4,19 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import NoReturn
 
-from pydantic import Field
-
-from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import WorkerDied, local_executor
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.recording.disparity import CODING_ERROR_PX, LARGEST_PX
-from semgrid_eval.sources.known import Source
 from semgrid_eval.sources.ros2.bag import name_of
 from semgrid_eval.sources.ros2.inspection import inspect_bags
-from semgrid_eval.sources.ros2.mapping import MAP_FILE, BagMap, load_map
+from semgrid_eval.sources.ros2.mapping import BagMap, load_map
+from semgrid_eval.sources.ros2.options import Ros2Options
 from semgrid_eval.sources.ros2.plan import BagPlan, Cut, plan_bag, told
 
-_HELP = """Convert ROS 2 bags to logs OUT/<split>/<bag>_<first frame>.mcap.
-
-BAG is a folder or a single file, .mcap or .db3. The map file says which topics are which; --inspect lists the topics of
-a bag and writes a first one, which usually works as it stands.
-
-A frame has all pictures that the map names, paired by their stamps; what lacks one is left out, and counted. Windows
-count frames, so a recording ends where frames are missing, and after --recording-s.
-
-A bag fails as a whole, in one line, if a topic is missing or changes, its calibration is of another size, its clock
-jumps or it is damaged. The others are converted; the exit code is then 1. Logs whose inputs have not changed are left
-as they are.
-"""
-_LONGEST = "Longest recording in seconds; each bag is cut into equal parts.  0: only where frames are missing."
 _TOLD_AT_M = 50.0
-_MAP = "The map file; with --inspect, the one to write."
-
-
-class Ros2Options(Config):
-    """Which bags, and what they are."""
-
-    bag: tuple[Path, ...]
-    map: Annotated[str, Field(description=_MAP)] = MAP_FILE
-    split: Annotated[Literal["train", "val", "test"], Field(description="Of all these bags.")] = "val"
-    recording_s: Annotated[float, Field(ge=0, le=86_400, description=_LONGEST)] = 30.0
 
 
 def convert_bags(options: Ros2Options, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
@@ -112,12 +86,3 @@ def _codings(plan: BagPlan) -> list[str]:
         at_m, nearest_m = _TOLD_AT_M**2 / depth_px * CODING_ERROR_PX, depth_px / LARGEST_PX
         found.append(f"{coded}, {at_m:.3f} m at {_TOLD_AT_M:g} m; what is nearer than {nearest_m:.2f} m has none")
     return found
-
-
-SOURCE = Source(
-    options=Ros2Options,
-    convert=convert_bags,
-    help=_HELP,
-    example="semgrid-eval convert ros2 drive logs --map map.yaml",
-    inspect=inspect,
-)

@@ -23,7 +23,8 @@ from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.relabel import segment_logs
 from semgrid_eval.sources.ros2.cameras import Info, Rectification
-from semgrid_eval.sources.ros2.convert import Ros2Options, convert_bags
+from semgrid_eval.sources.ros2.convert import convert_bags
+from semgrid_eval.sources.ros2.options import Ros2Options
 
 FRAMES = 6
 WORLD = street(1, frames=FRAMES)

@@ -10,8 +10,9 @@ from support.ros_messages import camera_info, image, kind, matrix
 from support.toy_world import HEIGHT, START_NS, WIDTH, street
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.sources.ros2.convert import Ros2Options, convert_bags
+from semgrid_eval.sources.ros2.convert import convert_bags
 from semgrid_eval.sources.ros2.mapping import load_map
+from semgrid_eval.sources.ros2.options import Ros2Options
 
 WORLD = street(1, frames=4)
 MESSAGES = list(RecordingBag(WORLD.recording()).messages())
@@ -340,7 +341,7 @@ def map_fault(here, text):
             "one of disparity, depth and right is needed, not disparity and de",
         ),
         ("ids: label_ids", "ids: {rode: [1]}", "'rode' is not one of unlabeled, "),
-        ("rectified: true", "rectified: 1", "cameras.front.rectified: Input should be a valid boolean (found 1)"),
+        ("rectified: true", "rectified: 1", "cameras.front.rectified: "),
         ("right_info: /stereo/right/camera_info", "extrinsics: {x_m: , y_m: 0.0, z_m: 1.0}", "extrinsics.x_m: "),
     ],
 )

@@ -15,7 +15,8 @@ from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs, write_log
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.sources.cityscapes.tree import CityscapesOptions, find_sequences
-from semgrid_eval.sources.ros2.convert import Ros2Options, convert_bags
+from semgrid_eval.sources.ros2.convert import convert_bags
+from semgrid_eval.sources.ros2.options import Ros2Options
 
 REAL = os.environ.get("SEMGRID_REAL_DATA", "")
 
