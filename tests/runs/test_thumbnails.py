@@ -19,7 +19,7 @@ from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
-from semgrid_eval.recording.png import decode_ids, read_header
+from semgrid_eval.recording.png import decode_ids
 from semgrid_eval.report.page.write import write_report
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
@@ -223,7 +223,7 @@ def test_the_track_is_kept_with_the_camera_that_sees_it(logs, tmp_path):
 
 
 def test_a_damaged_image_of_a_log_is_named_on_the_page(tmp_path, monkeypatch):
-    monkeypatch.setattr("semgrid_eval.log.writer.require_pixels", read_header)  # as another writer would
+    monkeypatch.setattr("semgrid_eval.log.writer.require_whole", read_size)  # as another writer would
     for i in range(2):
         recording = street(i, frames=9).recording(f"toy{i}")
         recording = with_broken_image(recording, START_NS + 5 * FRAME_NS) if i else recording
