@@ -19,6 +19,7 @@ from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
+from semgrid_eval.recording.colour import read_size
 from semgrid_eval.recording.png import decode_ids
 from semgrid_eval.report.page.write import write_report
 from semgrid_eval.runs.matrix import load_matrix
