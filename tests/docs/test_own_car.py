@@ -78,7 +78,8 @@ def test_the_long_map_of_the_page_is_one(workplace):
 
 
 def test_what_the_page_says_is_refused_is_what_the_tests_of_bags_expect():
-    tested = (Path(__file__).parents[1] / "sources" / "ros2" / "test_faults.py").read_text(encoding="utf-8")
+    here = Path(__file__).parents[1] / "sources" / "ros2"
+    tested = "".join((here / f"test_{name}.py").read_text(encoding="utf-8") for name in ("faults", "damage"))
     shown = re.findall(r"^\| [^|]+ \| `+(.+?)`+ \|$", PAGE[PAGE.index("## What is refused") :], re.MULTILINE)
     assert len(shown) == 11
     for line in shown:

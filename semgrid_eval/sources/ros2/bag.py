@@ -113,6 +113,6 @@ def _damage_as_input_error(path: Path, arrival: Arrival | None = None) -> Iterat
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", path=path, field=field) from error
     except Exception as error:
-        text = " ".join(str(error).split())[:_SHOWN] or type(error).__name__
+        text = " ".join(str(error).split())[:_SHOWN].rstrip(".") or type(error).__name__
         advice = _ADVICE if any(sign in text for sign in _CUT_OFF) else ""
         raise InputError(f"is damaged or not a bag: {text}{advice}", path=path, field=field) from error
