@@ -22,6 +22,7 @@ FINE = {
     *("MIT-0", "MIT-CMU", "PSF-2.0", "Python-2.0", "Unlicense", "Zlib"),
     *("MPL-2.0", "EPL-2.0"),  # of files, which are used as they are
     "Apache-2.0 WITH LLVM-exception",
+    "any-OSI",  # whichever one chooses
 }
 """SPDX identifiers; `BSD` where a package does not say which."""
 _CUDA = "not open source; of CUDA, which PyTorch's packages for GPUs bring along"

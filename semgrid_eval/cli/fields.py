@@ -10,9 +10,11 @@ from pydantic.fields import FieldInfo
 
 from semgrid_eval.config import Config
 
+_THERE = click.Path(path_type=Path, exists=True)
+
 
 def parameters_of(config: type[Config]) -> Iterator[click.Parameter]:
-    """Make an option for each field of a configuration, and an argument for a path without default.
+    """Make an option for each field of a configuration, and an argument for a path, or paths, without default.
 
     Fields are numbers, words, paths, flags, `Literal` of words, tuples of a fixed length of such, or of any length
     (`tuple[str, ...]`: the option may be given several times). Limits are for the configuration to check.
@@ -20,7 +22,9 @@ def parameters_of(config: type[Config]) -> Iterator[click.Parameter]:
     for name, field in config.model_fields.items():
         kind = _plain(field.annotation)
         if kind is Path and field.is_required():
-            yield click.Argument([name], type=click.Path(path_type=Path, exists=True))
+            yield click.Argument([name], type=_THERE)
+        elif kind == tuple[Path, ...] and field.is_required():
+            yield click.Argument([name], type=_THERE, nargs=-1, required=True)
         else:
             yield click.Option([f"--{name.replace('_', '-')}", name], **_settings(kind, field))
 
@@ -41,7 +45,7 @@ def _settings(kind: Any, field: FieldInfo) -> dict[str, Any]:  # noqa: ANN401 - 
 def _value_type(kind: Any) -> Any:  # noqa: ANN401 - types
     if get_origin(kind) is Literal:
         return click.Choice(get_args(kind))
-    return click.Path(path_type=Path, exists=True) if kind is Path else kind
+    return _THERE if kind is Path else kind
 
 
 def _plain(annotation: Any) -> Any:  # noqa: ANN401 - a type annotation

@@ -112,7 +112,7 @@ def _read_camera(
     for frame in log.frames(camera):
         if not frame.label_png:
             place = f"frame at {frame.stamp_ns} ns"
-            raise LogError("has no label image; add labels to the log (convert cityscapes --labels DIR)", field=place)
+            raise LogError("has no label image; `semgrid-eval segment` adds them", field=place)
         with _placed(camera, DISPARITY, frame.stamp_ns):
             disparity = decode_gray(frame.disparity_png, bit_depth=16)
         with _placed(camera, LABEL, frame.stamp_ns):

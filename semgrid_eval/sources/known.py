@@ -19,13 +19,15 @@ C = TypeVar("C", bound="Config")
 class Source(Generic[C]):
     """What makes recordings, as the command line offers it.
 
-    Each field of `options` is an option, described by its `description`; a path without default is an argument.
+    Each field of `options` is an option, described by its `description`; a path without default is an argument, and so
+    are several of them (`tuple[Path, ...]`).
     """
 
     options: type[C]
     convert: "Callable[[C, Path, Work], ConversionSummary]"  # writes the logs OUT/<split>/<name>.mcap of what is chosen
     help: str  # what the command does
     example: str  # a use of the command
+    inspect: Callable[[C], str] | None = None  # what --inspect does with what is given, and what it has to say
     cache: str = ""  # what the source keeps in the folder `Work.cache`, and where that is by default; empty if nothing
 
 
@@ -40,6 +42,7 @@ class Known(NamedTuple):
 SOURCES = {
     "cityscapes": Known("semgrid_eval.sources.cityscapes.source:SOURCE", "Sequence trees in Cityscapes' layout."),
     "synthetic": Known("semgrid_eval.sources.town.source:SYNTHETIC", "Drives through a simulated town."),
+    "ros2": Known("semgrid_eval.sources.ros2.source:SOURCE", "ROS 2 bags, by a map of their topics."),
     "town-v1": Known("semgrid_eval.sources.town.source:TOWN_V1", "A frozen data set of the simulated town."),
 }
 
@@ -56,17 +59,16 @@ def load_source(name: str) -> Source[Any]:
     return found
 
 
-def later(place: str, extra: str = "") -> "Callable[[Any, Path, Work], ConversionSummary]":
-    """Return the `convert` of a source, `module:name`, that is imported when it is called: no help waits for it.
+def later(place: str, extra: str = "") -> Callable[..., Any]:
+    """Return what a source does, `module:name`, to be imported when it is called: no help waits for it.
 
     Where a package of `extra` is not installed, the call raises a MissingExtraError.
     """
 
-    def convert(options: "Config", out: Path, work: "Work") -> "ConversionSummary":
-        done: ConversionSummary = _imported(place, extra)(options, out, work)
-        return done
+    def call(*given: object) -> Any:  # noqa: ANN401 - whatever it returns
+        return _imported(place, extra)(*given)
 
-    return convert
+    return call
 
 
 def _imported(place: str, extra: str) -> Any:  # noqa: ANN401 - what stands there

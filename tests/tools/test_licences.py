@@ -35,6 +35,7 @@ def package(*, version="1.0", classifiers=(), **fields):
         ("(MIT OR GPL-2.0-only) AND Apache-2.0", True),
         ("(MIT AND GPL-2.0-only) OR LGPL-3.0-only", False),
         ("Apache-2.0 WITH LLVM-exception AND BSD-2-Clause", True),
+        ("any-OSI", True),
         ("unknown", False),
         ("", False),
     ],
