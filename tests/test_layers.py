@@ -42,6 +42,7 @@ ALLOWED_IN = {
     "matplotlib": {"report", "api"},
     "sumo": {"sources"},
     "trimesh": {"sources"},
+    "rosbags": {"sources"},
 }
 
 

@@ -34,7 +34,7 @@ def draw_log(path: Path) -> Picture:
     with LogReader(path) as log:
         frame = next(log.frames(log.scene.cameras[0], images=True))
     grid = class_palette()[build_log(path, GridConfig())[0].grids[0, 0]]
-    image = np.asarray(Image.open(io.BytesIO(frame.image_png or b"")).convert("RGB"))
+    image = np.asarray(Image.open(io.BytesIO(frame.image_file or b"")).convert("RGB"))
     label = label_palette()[decode_gray(frame.label_png or b"", bit_depth=8)]
     disparity = decode_gray(frame.disparity_png, bit_depth=16)
     near = np.clip(disparity / 256 / (NEAR_PX * disparity.shape[1]), 0, 1)

@@ -16,6 +16,12 @@ if TYPE_CHECKING:
     from semgrid_eval.log.convert import ConversionSummary
 
 
+_INSPECT = "inspect"
+_INSPECT_HELP = (
+    "Say what is there, and write what a conversion needs to know; nothing is converted, and OUT is left out."
+)
+
+
 class _Sources(click.Group):
     """Imports a source only when its command is asked for."""
 
@@ -41,17 +47,38 @@ def command_of(name: str, source: Source[Any]) -> click.Command:
 
     @workers_option("Logs at once.")
     @executor_options
-    def convert(out: Path, workers: int, executor: str, address: str, **given: Any) -> int:  # noqa: ANN401 - options
+    def convert(workers: int, executor: str, address: str, out: Path | None = None, **given: Any) -> int:  # noqa: ANN401
         from semgrid_eval.log.convert import Work
 
+        if given.pop(_INSPECT, False):
+            assert source.inspect is not None
+            click.echo(source.inspect(parse_config(source.options, given)))
+            return 0
+        assert out is not None, "it may be left out with --inspect alone"
         work = Work(workers, chosen_executor(executor, address, workers), given.pop("cache", None), progress)
         return show(source.convert(parse_config(source.options, given), out, work), out)
 
     parameters = [*parameters_of(source.options), click.Argument(["out"], type=FOLDER)]
     if source.cache:
         parameters.append(click.Option(["--cache"], type=FOLDER, help=source.cache))
-    made = click.command(name, params=parameters, help=cleandoc(source.help), epilog=f"Example: {source.example}")
-    return made(convert)
+    kind = click.Command
+    if source.inspect:
+        parameters.append(click.Option([f"--{_INSPECT}"], is_flag=True, help=_INSPECT_HELP))
+        kind = _Inspectable
+    epilog = f"Example: {source.example}"
+    return click.command(name, kind, params=parameters, help=cleandoc(source.help), epilog=epilog)(convert)
+
+
+class _Inspectable(click.Command):
+    """Needs no OUT where it is asked to inspect."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        ctx.meta[_INSPECT] = f"--{_INSPECT}" in args
+        return super().parse_args(ctx, args)
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        found = super().get_params(ctx)
+        return [each for each in found if each.name != "out"] if ctx.meta.get(_INSPECT) else found
 
 
 def show(summary: "ConversionSummary", out: Path) -> int:

@@ -21,7 +21,7 @@ device_option = click.option("--device", default="auto", show_default=True, help
 
 
 def parameters_of(config: type[Config]) -> Iterator[click.Parameter]:
-    """Make an option for each field of a configuration, and an argument for a path without default.
+    """Make an option for each field of a configuration, and an argument for a path, or paths, without default.
 
     Fields are numbers, words, paths, flags, `Literal` of words, tuples of a fixed length of such, or of any length
     (`tuple[str, ...]`: the option may be given several times). Limits are for the configuration to check.
@@ -29,7 +29,9 @@ def parameters_of(config: type[Config]) -> Iterator[click.Parameter]:
     for name, field in config.model_fields.items():
         kind = _plain(field.annotation)
         if kind is Path and field.is_required():
-            yield click.Argument([name], type=click.Path(path_type=Path, exists=True))
+            yield click.Argument([name], type=THERE)
+        elif kind == tuple[Path, ...] and field.is_required():
+            yield click.Argument([name], type=THERE, nargs=-1, required=True)
         else:
             yield click.Option([f"--{name.replace('_', '-')}", name], **_settings(kind, field))
 

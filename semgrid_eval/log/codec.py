@@ -27,6 +27,7 @@ from semgrid_eval.log.schemas.actors_pb2 import Actors
 from semgrid_eval.log.schemas.egomotion_pb2 import Egomotion
 from semgrid_eval.log.schemas.stereo_calibration_pb2 import CameraExtrinsics, StereoCalibration
 from semgrid_eval.log.topics import BASE_FRAME, GRID_FRAME, MAP_FRAME, ODOM_FRAME, optical_frame
+from semgrid_eval.recording.colour import kind_of
 from semgrid_eval.recording.types import Actor, CameraCalibration, MotionSample, Pose, Quantity
 
 RECORD = "semgrid.scene"
@@ -143,13 +144,14 @@ def stamp_ns(message_timestamp: Timestamp) -> int:
     return found
 
 
-def image_message(stamp_ns: int, camera: str, png: bytes) -> CompressedImage:
-    """Wrap a PNG file of a camera."""
-    return CompressedImage(timestamp=timestamp(stamp_ns), frame_id=optical_frame(camera), data=png, format="png")
+def image_message(stamp_ns: int, camera: str, file: bytes) -> CompressedImage:
+    """Wrap a PNG or JPEG file of a camera."""
+    time = timestamp(stamp_ns)
+    return CompressedImage(timestamp=time, frame_id=optical_frame(camera), data=file, format=kind_of(file))
 
 
 def read_image(data: bytes) -> bytes:
-    """Return the PNG file in a message."""
+    """Return the PNG or JPEG file in a message."""
     return bytes(CompressedImage.FromString(data).data)
 
 

@@ -13,7 +13,8 @@ from semgrid_eval.log.findings import Finding, error
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.motion import MotionSample
-from semgrid_eval.recording.png import decode_gray, read_header
+from semgrid_eval.recording.colour import read_size
+from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame
 
 _NS_PER_S = 1e9
@@ -98,13 +99,13 @@ def _frame_values(frame: CameraFrame) -> Iterator[tuple[str, str, Extent]]:
 
 def _require_size(frame: CameraFrame, size: tuple[int, int] | None) -> tuple[int, int]:
     """Return the size (width, height) of all pictures of a frame, that of the frames before if there were any."""
-    for channel, png in (("disparity", frame.disparity_png), ("label", frame.label_png), ("image", frame.image_png)):
+    for channel, png in (("disparity", frame.disparity_png), ("label", frame.label_png), ("image", frame.image_file)):
         if png is None:
             continue
-        header = read_header(png)
-        size = size or (header.width, header.height)
-        if header[:2] != size:
-            raise InputError(f"is {header.width} x {header.height}, not {size[0]} x {size[1]}", field=channel)
+        found = read_size(png)
+        size = size or found
+        if found != size:
+            raise InputError(f"is {found.width} x {found.height}, not {size[0]} x {size[1]}", field=channel)
     assert size is not None
     return size
 

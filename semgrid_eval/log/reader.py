@@ -23,7 +23,7 @@ _DECODERS: dict[str, Callable[[bytes], Any]] = {
 
 
 class Picture(NamedTuple):
-    """A PNG file of a camera; `channel` is one of `topics.PICTURES`."""
+    """A PNG file of a camera, or JPEG if in colour; `channel` is one of `topics.PICTURES`."""
 
     stamp_ns: int
     camera: str
@@ -205,6 +205,6 @@ def camera_frames(pictures: Iterable[Picture]) -> Iterator[tuple[str, CameraFram
         for picture in of_one_time:
             by_camera.setdefault(picture.camera, {})[topics.PICTURE_FIELDS[picture.channel]] = picture.png
         for camera, found in by_camera.items():
-            image_png, label_png = found.pop("image_png", None), found.pop("label_png", None)
+            image_file, label_png = found.pop("image_file", None), found.pop("label_png", None)
             if "disparity_png" in found:
-                yield camera, CameraFrame(stamp_ns, image_png=image_png, label_png=label_png, **found)
+                yield camera, CameraFrame(stamp_ns, image_file=image_file, label_png=label_png, **found)

@@ -39,7 +39,7 @@ PICTURES: dict[str, tuple[str, dict[str, str]]] = {
     "exact_disparity_png": (EXACT_DISPARITY, _DISPARITY_NOTES),
     "exact_label_png": (EXACT_LABEL, _LABEL_NOTES),
     "instance_png": (INSTANCE, _INSTANCE_NOTES),
-    "image_png": (IMAGE, {}),
+    "image_file": (IMAGE, {}),
 }
 """Channel of a camera and its metadata by field of `CameraFrame`, in the order of writing.
 

@@ -15,7 +15,8 @@ from semgrid_eval.log import codec, topics
 from semgrid_eval.log.container import MAX_STAMP_NS
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.motion import EgoMotion, implausible
-from semgrid_eval.recording.png import PngHeader, read_header, require_pixels, with_palette
+from semgrid_eval.recording.colour import ImageSize, read_size, require_whole
+from semgrid_eval.recording.png import read_header, require_pixels, with_palette
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 
 CHUNK_BYTES = 1 << 20
@@ -170,9 +171,9 @@ class MomentWriter:
             self._writer.write(topics.TRUE_ACTORS, codec.actors_message(now_ns, moment.actors), log_ns=now_ns)
 
     def _camera(self, camera: str, frame: CameraFrame) -> None:
-        header = self._whole(camera, topics.DISPARITY, frame.disparity_png, frame.stamp_ns)
+        size_px = self._whole(camera, topics.DISPARITY, frame.disparity_png, frame.stamp_ns)
         calibration = self._recording.calibrations[camera]
-        known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, (header.width, header.height))
+        known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, size_px)
         self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
         self._writer.write(camera_topic(camera, topics.STEREO), rest, log_ns=frame.stamp_ns)
         for picture, (channel, notes) in topics.PICTURES.items():
@@ -188,10 +189,13 @@ class MomentWriter:
             self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes)
         self._writer.end_chunk()
 
-    def _whole(self, camera: str, channel: str, png: bytes, stamp_ns: int) -> PngHeader:
-        """Make sure that a picture can be decoded, so that no log holds another."""
+    def _whole(self, camera: str, channel: str, png: bytes, stamp_ns: int) -> ImageSize:
+        """Make sure that a picture can be decoded, so that no log holds another; only colour may be JPEG."""
         try:
-            return read_header(png) if self._recording.encoded_here else require_pixels(png)
+            if channel == topics.IMAGE:
+                return read_size(png) if self._recording.encoded_here else require_whole(png)
+            header = read_header(png) if self._recording.encoded_here else require_pixels(png)
+            return ImageSize(header.width, header.height)
         except InputError as error:
             place = f"{self._recording.name}: {camera_topic(camera, channel)} at {stamp_ns} ns"
             raise InputError(str(error), field=place) from error

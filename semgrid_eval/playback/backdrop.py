@@ -14,7 +14,7 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import GRID_INPUT, GRID_PREDICTION, camera_topic
-from semgrid_eval.recording.png import read_header
+from semgrid_eval.recording.colour import read_size
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.scores.results import RowRecord
 from semgrid_eval.sensors.camera import frame_poses
@@ -90,10 +90,9 @@ class Backdrop:
 
     def _size_px(self, png: bytes, topic: str) -> tuple[int, int]:
         try:
-            header = read_header(png)
+            return read_size(png)
         except InputError as error:
             raise LogError(str(error), path=self._log.path, field=topic) from error
-        return header.width, header.height
 
 
 _TEMPLATE = "data/foxglove_layout.json"

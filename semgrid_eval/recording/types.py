@@ -71,13 +71,13 @@ class Actor:
 
 @dataclass(frozen=True)
 class CameraFrame:
-    """One moment of one camera; images are PNG files as bytes, untouched, all of one size.
+    """One moment of one camera; images are files as bytes, untouched, all of one size: PNG, or JPEG if in colour.
 
     Disparity is 16 bit: d_px = (p - 1) / 256 and p = 0 is invalid. Labels are 8-bit Cityscapes label ids.
     """
 
     stamp_ns: int
-    image_png: bytes | None
+    image_file: bytes | None
     disparity_png: bytes
     label_png: bytes | None
     exact_label_png: bytes | None = None  # truth: labels without the errors of a segmentation network

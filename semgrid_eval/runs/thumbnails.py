@@ -17,7 +17,8 @@ from semgrid_eval.log.container import damage_as_log_error
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.motion import Integrator
 from semgrid_eval.progress import Stage
-from semgrid_eval.recording.png import decode_colour, decode_ids, encode_gray, read_header, with_palette
+from semgrid_eval.recording.colour import decode_colour
+from semgrid_eval.recording.png import decode_ids, encode_gray, read_header, with_palette
 from semgrid_eval.scores.thumbnails import (
     FramePictures,
     LogPictures,
@@ -97,9 +98,9 @@ def log_pictures(log: Path, digest: str, grid: GridConfig, stamps_ns: Iterable[i
     return LogPictures(track, frames, tuple(faults))
 
 
-def small_image(png: bytes) -> bytes:
-    """Turn a colour image, a PNG file, into a small WebP file; an InputError says that it cannot be decoded."""
-    image = decode_colour(png)
+def small_image(file: bytes) -> bytes:
+    """Turn a colour image, a PNG or JPEG file, into a small WebP file; an InputError says that it cannot be decoded."""
+    image = decode_colour(file)
     small = cv2.resize(image, _small_size(*image.shape[:2])[::-1], interpolation=cv2.INTER_AREA)
     _, data = cv2.imencode(".webp", small[..., ::-1], [cv2.IMWRITE_WEBP_QUALITY, WEBP_QUALITY])
     return bytes(data)

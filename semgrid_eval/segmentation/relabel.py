@@ -15,7 +15,8 @@ from semgrid_eval.files import digest_files, digest_value
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs, read_recording
-from semgrid_eval.recording.png import decode_colour, encode_gray
+from semgrid_eval.recording.colour import decode_colour
+from semgrid_eval.recording.png import encode_gray
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.network import SegmentationNetwork
@@ -63,9 +64,9 @@ def _relabelled(recording: Recording, label: Labeller) -> Iterator[Moment]:
 
 
 def _relabelled_frame(frame: CameraFrame, label: Labeller) -> CameraFrame:
-    if frame.image_png is None:
+    if frame.image_file is None:
         return replace(frame, label_png=None)
-    return replace(frame, label_png=encode_gray(label(decode_colour(frame.image_png))))
+    return replace(frame, label_png=encode_gray(label(decode_colour(frame.image_file))))
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ def _read_camera(
     for frame in log.frames(camera):
         if not frame.label_png:
             place = f"frame at {frame.stamp_ns} ns"
-            raise LogError("has no label image; add labels to the log (convert cityscapes --labels DIR)", field=place)
+            raise LogError("has no label image; `semgrid-eval segment` adds them", field=place)
         disparity, label = decode_gray(frame.disparity_png, bit_depth=16), decode_gray(frame.label_png, bit_depth=8)
         seen = {view: projection.points(disparity, label) for view, projection in projections.items()}
         for name, sensor in sensors.items():

@@ -19,13 +19,15 @@ C = TypeVar("C", bound=Config)
 class Source(Generic[C]):
     """What makes recordings, as the command line offers it.
 
-    Each field of `options` is an option, described by its `description`; a path without default is an argument.
+    Each field of `options` is an option, described by its `description`; a path without default is an argument, and so
+    are several of them (`tuple[Path, ...]`).
     """
 
     options: type[C]
     convert: "Callable[[C, Path, Work], ConversionSummary]"  # writes the logs OUT/<split>/<name>.mcap of what is chosen
     help: str  # what the command does
     example: str  # a use of the command
+    inspect: Callable[[C], str] | None = None  # what --inspect does with what is given, and what it has to say
     cache: str = ""  # what the source keeps in the folder `Work.cache`, and where that is by default; empty if nothing
 
 
@@ -39,6 +41,7 @@ class Known(NamedTuple):
 SOURCES = {
     "cityscapes": Known("semgrid_eval.sources.cityscapes.tree:SOURCE"),
     "synthetic": Known("semgrid_eval.sources.town.convert:SOURCE", extra="synthetic"),
+    "ros2": Known("semgrid_eval.sources.ros2.convert:SOURCE", extra="ros"),
     "town-v1": Known("semgrid_eval.sources.town.convert:TOWN_V1", extra="synthetic"),
 }
 

@@ -19,14 +19,15 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.models.model import Given, Model, require_answer
 from semgrid_eval.motion import EgoMotion
-from semgrid_eval.recording.png import decode_colour, decode_gray
+from semgrid_eval.recording.colour import decode_colour
+from semgrid_eval.recording.disparity import coded_disparity
+from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.recording.types import CameraFrame
 from semgrid_eval.segmentation.network import SegmentationNetwork
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sensors.projection import Projection
 from semgrid_eval.sensors.sensor import Points
 from semgrid_eval.sources.matching import SemiGlobalMatching
-from semgrid_eval.sources.town.picture_errors import coded_disparity
 from semgrid_eval.streams.laps import Laps
 from semgrid_eval.streams.right_images import RightImages
 from semgrid_eval.windows.data import WindowBatch
@@ -122,7 +123,7 @@ class LiveLog:
                 np.uint16, copy=False
             )
         if self.needs_colour:
-            left = decode_colour(self._needed(frame.image_png, "colour image", frame), path=self._log.path)
+            left = decode_colour(self._needed(frame.image_file, "colour image", frame), path=self._log.path)
         return _Pictures(label, disparity, left, None if right_png is None else decode_colour(right_png))
 
     def _needed(self, png: bytes | None, what: str, frame: CameraFrame) -> bytes:

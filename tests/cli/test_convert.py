@@ -115,7 +115,7 @@ def test_help_works_though_the_synthetic_extra_is_missing(monkeypatch, capsys):
 
 
 def test_sources_are_listed():
-    assert command.list_commands(None) == ["cityscapes", "synthetic", "town-v1"]
+    assert command.list_commands(None) == ["cityscapes", "synthetic", "ros2", "town-v1"]
 
 
 @pytest.mark.skipif(
@@ -136,5 +136,5 @@ def test_real_recordings_are_converted_without_a_finding(tmp_path):
             assert len(log.motion()) == len(frames)
             assert all(frame.label_png is not None for frame in frames)
             first = source / "leftImg8bit_sequence" / log.scene.split
-            assert frames[0].image_png == next(first.glob(f"*/{log.scene.name}_leftImg8bit.png")).read_bytes()
+            assert frames[0].image_file == next(first.glob(f"*/{log.scene.name}_leftImg8bit.png")).read_bytes()
     assert total == len(images)

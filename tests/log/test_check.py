@@ -71,7 +71,7 @@ def test_any_damage_is_an_error(tmp_path):
 
 def test_missing_labels_and_images_are_counted(tmp_path):
     def change(number, moment):
-        return with_frame(moment, label_png=None) if number < 3 else with_frame(moment, image_png=None)
+        return with_frame(moment, label_png=None) if number < 3 else with_frame(moment, image_file=None)
 
     assert findings(tmp_path, change) == {
         f"/camera/front/{channel}: missing_beside": (

@@ -36,7 +36,7 @@ def test_moments_come_back_with_all_they_held(tmp_path):
     for now, then in zip(read.moments(), driving().moments(), strict=True):
         assert (now.stamp_ns, now.motion, now.actors) == (then.stamp_ns, then.motion, then.actors)
         assert now.pose.yaw_rad == pytest.approx(then.pose.yaw_rad, abs=1e-14)
-        assert now.cameras["front"].image_png == then.cameras["front"].image_png
+        assert now.cameras["front"].image_file == then.cameras["front"].image_file
         assert (now.cameras["front"].label_png is None) == (then.cameras["front"].label_png is None)
     assert read.source_files == driving().source_files
     assert read.calibrations == driving().calibrations

@@ -81,7 +81,7 @@ def test_pictures_come_back_byte_by_byte_and_labels_pixel_by_pixel(log):
     written = [moment.cameras["front"] for moment in driving().moments()]
     for read, frame in zip(log.frames("front", images=True), written, strict=True):
         assert read.stamp_ns == frame.stamp_ns
-        for field in ("image_png", "disparity_png", "exact_disparity_png", "instance_png"):
+        for field in ("image_file", "disparity_png", "exact_disparity_png", "instance_png"):
             assert getattr(read, field) == getattr(frame, field)
         for field in ("label_png", "exact_label_png"):
             before, after = getattr(frame, field), getattr(read, field)
@@ -92,14 +92,14 @@ def test_pictures_come_back_byte_by_byte_and_labels_pixel_by_pixel(log):
 
 
 def test_images_are_left_out_unless_asked_for(log):
-    assert [frame.image_png for frame in log.frames("front")] == [None] * 6
-    assert sum(frame.image_png is not None for frame in log.frames("front", images=True)) == 2
+    assert [frame.image_file for frame in log.frames("front")] == [None] * 6
+    assert sum(frame.image_file is not None for frame in log.frames("front", images=True)) == 2
 
 
 def test_pictures_of_chosen_channels_come_in_the_order_of_time(log):
     frames = list(log.frames("front", images=True))
     labels = [("label", frame.stamp_ns, frame.label_png) for frame in frames if frame.label_png]
-    images = [("image", frame.stamp_ns, frame.image_png) for frame in frames if frame.image_png]
+    images = [("image", frame.stamp_ns, frame.image_file) for frame in frames if frame.image_file]
     found = [(each.channel, each.stamp_ns, each.png) for each in log.pictures(["front"], ["image", "label"])]
     assert found == sorted(labels + images, key=lambda entry: (entry[1], entry[0] == "image"))
     assert {picture.camera for picture in log.pictures(["front"], ["image"])} == {"front"}
@@ -314,7 +314,7 @@ def test_a_picture_that_cannot_be_decoded_is_not_converted(tmp_path):
     def moments():
         for moment in recording.moments():
             broken = {
-                name: replace(f, image_png=f.disparity_png[:-30] + f.disparity_png[-12:])
+                name: replace(f, image_file=f.disparity_png[:-30] + f.disparity_png[-12:])
                 for name, f in moment.cameras.items()
             }
             yield replace(moment, cameras=broken)

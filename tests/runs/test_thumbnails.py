@@ -77,7 +77,7 @@ def test_pictures_show_what_the_camera_saw(logs, tmp_path):
         frame = frames[stamp_ns]
         assert np.array_equal(decode_ids(kept.label), decode_ids(frame.label_png))
         shown = np.asarray(Image.open(io.BytesIO(kept.image)).convert("RGB"), int)
-        source = np.asarray(Image.open(io.BytesIO(frame.image_png)).convert("RGB"), int)
+        source = np.asarray(Image.open(io.BytesIO(frame.image_file)).convert("RGB"), int)
         assert shown.shape == source.shape
         assert np.abs(shown - source).mean() < 6
 
@@ -107,7 +107,7 @@ def test_labels_are_sampled_not_mixed_and_have_their_colours():
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff\xe0 a photo", png(np.zeros((9, 9, 3), np.uint8))[:60]])
 def test_what_cannot_be_decoded_is_told(data):
     for small in (small_image, small_label):
-        with pytest.raises(InputError, match="PNG file"):
+        with pytest.raises(InputError, match=r"(PNG|JPEG) file"):
             small(data)
 
 
@@ -118,8 +118,8 @@ def with_broken_image(recording, stamp_ns):
         for moment in recording.moments():
             frame = moment.cameras["front"]
             if moment.stamp_ns == stamp_ns:
-                image_png = png(np.zeros((9, 9, 3), np.uint8))[:33] + png(np.zeros((1, 1, 3), np.uint8))[33:]
-                frame = replace(frame, image_png=image_png)
+                image_file = png(np.zeros((9, 9, 3), np.uint8))[:33] + png(np.zeros((1, 1, 3), np.uint8))[33:]
+                frame = replace(frame, image_file=image_file)
             yield replace(moment, cameras={"front": frame})
 
     return replace(recording, moments=moments)
@@ -159,7 +159,7 @@ def without_images(recording):
 
     def moments():
         for moment in recording.moments():
-            cameras = {name: dataclasses.replace(frame, image_png=None) for name, frame in moment.cameras.items()}
+            cameras = {name: dataclasses.replace(frame, image_file=None) for name, frame in moment.cameras.items()}
             yield dataclasses.replace(moment, cameras=cameras)
 
     return dataclasses.replace(recording, moments=moments)

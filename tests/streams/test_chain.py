@@ -114,7 +114,7 @@ def with_right_images(log, folder, *, frames=FRAMES):
             frame = moment.cameras["front"]
             disparity_px = np.maximum(decode_gray(frame.disparity_png, bit_depth=16).astype(np.float32) - 1, 0) / 256
             left = cv2.remap(right, columns - disparity_px, rows, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
-            yield replace(moment, cameras={"front": replace(frame, image_png=png(left))})
+            yield replace(moment, cameras={"front": replace(frame, image_file=png(left))})
 
     write_log(replace(recording, moments=moments), log)
     (folder / "toy").mkdir(parents=True)

@@ -32,7 +32,7 @@ def expected_labels(number: int, camera: str = "front", shape: tuple[int, int] =
 
 
 def _painted(moment: Moment, number: int | None) -> Moment:
-    frames = {camera: replace(frame, image_png=_image(camera, number)) for camera, frame in moment.cameras.items()}
+    frames = {camera: replace(frame, image_file=_image(camera, number)) for camera, frame in moment.cameras.items()}
     return replace(moment, cameras=frames)
 
 

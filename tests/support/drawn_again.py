@@ -9,14 +9,13 @@ import numpy as np
 from support.toy_world import ToyWorld, png, street
 
 from semgrid_eval.log.store import write_log
+from semgrid_eval.recording.disparity import coded_disparity, decoded_disparity
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.recording.types import Moment, Pose, Recording
 from semgrid_eval.sources.town.drives import Drive
 from semgrid_eval.sources.town.picture_errors import (
     PictureErrors,
     Strengths,
-    coded_disparity,
-    decoded_disparity,
     recording_streams,
 )
 from semgrid_eval.sources.town.rendering import RecordingPlan

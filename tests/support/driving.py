@@ -56,7 +56,7 @@ def _frame(rng: np.random.Generator, number: int, stamp_ns: int, size: tuple[int
     disparity = encode_gray(rng.integers(0, 1 << 15, shape).astype(np.uint16))
     return CameraFrame(
         stamp_ns,
-        image_png=encode_gray(rng.integers(0, 255, shape, dtype=np.uint8)) if number % 3 == 0 else None,
+        image_file=encode_gray(rng.integers(0, 255, shape, dtype=np.uint8)) if number % 3 == 0 else None,
         disparity_png=disparity,
         label_png=label if number % 2 == 0 else None,
         exact_label_png=encode_gray(rng.integers(0, 34, shape, dtype=np.uint8)),

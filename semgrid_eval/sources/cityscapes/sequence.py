@@ -118,7 +118,7 @@ class CityscapesSequence:
             for path in frame.labels:
                 label, label_size = files.read_label(path, train_ids=self.train_ids)
                 _require_size(path, label_size, first)
-            picture = CameraFrame(stamp_ns, image_png=image, disparity_png=disparity, label_png=label)
+            picture = CameraFrame(stamp_ns, image_file=image, disparity_png=disparity, label_png=label)
             yield Moment(stamp_ns, {self.camera_name: picture}, (files.read_vehicle(frame.vehicle, stamp_ns),))
 
 

@@ -57,14 +57,3 @@ class PictureErrors:
             self.labels.add(exact, frames) if self.labels else exact,
             self.disparity.add(exact_px, frames) if self.disparity else exact_px,
         )
-
-
-def coded_disparity(disparity_px: Float32s) -> NDArray[np.uint16]:
-    """Code disparities (H, W) as Cityscapes does: p = 256 d + 1, and 0 for what is not positive or too large."""
-    coded = np.rint(disparity_px * np.float32(256.0)) + np.float32(1.0)
-    return np.where((disparity_px > 0.0) & (coded <= 65535.0), coded, 0.0).astype(np.uint16)
-
-
-def decoded_disparity(coded: NDArray[np.uint16]) -> Float32s:
-    """Decode disparities (H, W); what is invalid, and what is at infinity, is 0."""
-    return np.asarray(np.maximum(coded.astype(np.float32) - 1.0, 0.0) / 256.0, np.float32)

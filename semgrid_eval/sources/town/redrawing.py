@@ -13,14 +13,13 @@ import numpy as np
 from semgrid_eval.errors import LogError, UnknownTruthError
 from semgrid_eval.files import digest_value
 from semgrid_eval.log.reader import LogReader
+from semgrid_eval.recording.disparity import coded_disparity, decoded_disparity
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.redrawing import Pictures
 from semgrid_eval.sources.town.noise import DisparityNoise, LabelNoise
 from semgrid_eval.sources.town.picture_errors import (
     PictureErrors,
     Strengths,
-    coded_disparity,
-    decoded_disparity,
     recording_streams,
 )
 from semgrid_eval.sources.town.rendering import RENDER_VERSION

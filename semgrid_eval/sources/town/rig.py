@@ -7,11 +7,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.recording.disparity import coded_disparity
 from semgrid_eval.recording.png import encode
 from semgrid_eval.recording.types import CameraFrame
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.matching import SemiGlobalMatching
-from semgrid_eval.sources.town.picture_errors import PictureErrors, Strengths, coded_disparity
+from semgrid_eval.sources.town.picture_errors import PictureErrors, Strengths
 from semgrid_eval.sources.town.sensors import Camera, View
 from semgrid_eval.sources.town.varied import Conditions
 
@@ -86,7 +87,7 @@ class Rig:
             measured_px = self._matcher.disparity_px(*(picture for _, picture in pictures))
         return CameraFrame(
             stamp_ns=stamp_ns,
-            image_png=encode(image[:, margin_px:], _COLOUR_PNG),
+            image_file=encode(image[:, margin_px:], _COLOUR_PNG),
             disparity_png=encode(coded_disparity(measured_px), _GREY_PNG),
             label_png=encode(measured, _GREY_PNG),
             exact_label_png=encode(label, _GREY_PNG),

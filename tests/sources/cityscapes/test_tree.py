@@ -27,7 +27,7 @@ def tree(tmp_path):
 def test_pictures_pass_through_byte_by_byte(tree):
     names = tree.write(range(3))
     for frame, name in zip(frames(only(tree)), names, strict=True):
-        assert frame.image_png == tree.image(name).read_bytes()
+        assert frame.image_file == tree.image(name).read_bytes()
         assert frame.disparity_png == tree.disparity(name).read_bytes()
         assert frame.label_png is None
 

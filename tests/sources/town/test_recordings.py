@@ -19,7 +19,7 @@ from semgrid_eval.sources.town.recordings import SyntheticConfig, plan_recording
 from semgrid_eval.sources.town.rendering import render_recording
 from semgrid_eval.sources.town.town import FIRST_PARKED_ID, TownSpec, prepare_town
 
-PICTURES = ("image_png", "disparity_png", "label_png", "exact_label_png", "exact_disparity_png", "instance_png")
+PICTURES = ("image_file", "disparity_png", "label_png", "exact_label_png", "exact_disparity_png", "instance_png")
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_a_recording_is_thirty_frames_on_an_irregular_clock(moments):
 
 
 def test_pictures_have_their_sizes_depths_and_labels(moments):
-    depths = {"image_png": "RGB", "disparity_png": "I;16", "label_png": "L", "exact_label_png": "L"}
+    depths = {"image_file": "RGB", "disparity_png": "I;16", "label_png": "L", "exact_label_png": "L"}
     depths |= {"exact_disparity_png": "I;16", "instance_png": "I;16"}
     for name in PICTURES:
         picture = Image.open(io.BytesIO(getattr(front(moments[0]), name)))

@@ -14,14 +14,13 @@ from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import LogError, UnknownTruthError
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
+from semgrid_eval.recording.disparity import coded_disparity, decoded_disparity
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.sources.redrawing import Pictures, redrawing_of
 from semgrid_eval.sources.town.noise import DisparityErrors, DisparityNoise
 from semgrid_eval.sources.town.picture_errors import (
     PictureErrors,
     Strengths,
-    coded_disparity,
-    decoded_disparity,
     recording_streams,
 )
 from semgrid_eval.sources.town.redrawing import TownErrors

@@ -1,0 +1,1 @@
+"""ROS 2 bags: folders and single files, of both storages."""

@@ -1,0 +1,122 @@
+"""`convert ros2`: bags as logs, by a map of their topics."""
+
+from collections import Counter
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal, NoReturn
+
+from pydantic import Field
+
+from semgrid_eval.config import Config
+from semgrid_eval.errors import InputError
+from semgrid_eval.executors import WorkerDied, local_executor
+from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
+from semgrid_eval.recording.disparity import CODING_ERROR_PX, LARGEST_PX
+from semgrid_eval.sources.known import Source
+from semgrid_eval.sources.ros2.inspection import inspect_bags
+from semgrid_eval.sources.ros2.mapping import MAP_FILE, BagMap, load_map
+from semgrid_eval.sources.ros2.plan import BagPlan, Cut, plan_bag, told
+
+_HELP = """Convert ROS 2 bags to logs OUT/<split>/<bag>_<first frame>.mcap.
+
+BAG is a folder or a single file, .mcap or .db3. The map file says which topics are which; --inspect lists the topics of
+a bag and writes a first one, which usually works as it stands.
+
+A frame has all pictures that the map names, paired by their stamps; what lacks one is left out, and counted. Windows
+count frames, so a recording ends where frames are missing, and after --recording-s.
+
+A bag fails as a whole, in one line, if a topic is missing or changes, its calibration is of another size, its clock
+jumps or it is damaged. The others are converted; the exit code is then 1. Logs whose inputs have not changed are left
+as they are.
+"""
+_LONGEST = "Longest recording in seconds; each bag is cut into equal parts.  0: only where frames are missing."
+_TOLD_AT_M = 50.0
+_MAP = "The map file; with --inspect, the one to write."
+
+
+class Ros2Options(Config):
+    """Which bags, and what they are."""
+
+    bag: tuple[Path, ...]
+    map: Annotated[str, Field(description=_MAP)] = MAP_FILE
+    split: Annotated[Literal["train", "val", "test"], Field(description="Of all these bags.")] = "val"
+    recording_s: Annotated[float, Field(ge=0, le=86_400, description=_LONGEST)] = 30.0
+
+
+def convert_bags(options: Ros2Options, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
+    """Write the logs of bags; those that are up to date stay as they are.
+
+    Raises:
+        InputError: the map cannot be used, two recordings have one name, or the disk is full.
+    """
+    mapping, cut = load_map(Path(options.map)), Cut(options.split, options.recording_s)
+    plans = _plans(options.bag, mapping, cut, work)
+    jobs = [job for plan in plans for job in _jobs(plan, options.split)]
+    summary = convert_jobs(jobs, out, work)
+    summary.remark = _remark([plan for plan in plans if not plan.fault], mapping, out)
+    return summary
+
+
+def inspect(options: Ros2Options) -> str:
+    """List what bags hold, and write a first map of the first of them where there is none yet."""
+    return inspect_bags(options.bag, Path(options.map))
+
+
+def _plans(bags: Sequence[Path], mapping: BagMap, cut: Cut, work: Work) -> list[BagPlan]:
+    """Read all bags once, several at a time."""
+    found: dict[int, BagPlan] = {}
+    with work.stage("scan") as progress:
+        scans = local_executor(work.workers).run(partial(plan_bag, mapping=mapping, cut=cut), bags)
+        for done, (index, plan) in enumerate(scans, start=1):
+            name = bags[index].stem
+            found[index] = BagPlan(name, fault=plan.reason) if isinstance(plan, WorkerDied) else plan
+            progress(done, len(bags), name)
+    return [found[index] for index in sorted(found)]
+
+
+def _jobs(plan: BagPlan, split: str) -> list[ConversionJob]:
+    if plan.fault:
+        refuse = partial(_refuse, plan.fault)
+        return [ConversionJob(plan.name, split, refuse, refuse)]
+    return [ConversionJob(each.name, split, each.digest, each.recording) for each in plan.stretches]
+
+
+def _refuse(fault: str) -> NoReturn:
+    raise InputError(fault)
+
+
+def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
+    """Say in one line what was kept and what was left out."""
+    if not plans:
+        return ""
+    lost = sum((plan.lost for plan in plans), Counter[str]())
+    total, kept = sum(plan.frames for plan in plans), sum(len(each.frames) for plan in plans for each in plan.stretches)
+    parts = [f"{kept} of {total} frames; {told(lost)}", *_codings(plans[0])]
+    if repeated := sum(plan.repeated for plan in plans):
+        parts.append(f"{repeated} messages with a stamp that was there before left out")
+    unlabelled = [name for name, camera in mapping.cameras.items() if camera.labels is None]
+    if unlabelled:
+        command = f"semgrid-eval segment {out} --model NETWORK.onnx --out LABELLED"
+        parts.append(f"no labels for {', '.join(unlabelled)}: add them with {command}")
+    return "; ".join(parts)
+
+
+def _codings(plan: BagPlan) -> list[str]:
+    """Say for each camera what its depth loses in the coding of logs."""
+    found = []
+    for name, rig in plan.stretches[0].rigs.items():
+        depth_px = rig.calibration.fx_px * rig.calibration.baseline_m  # disparity times depth
+        coded = f"{name}: disparity is rounded by at most 1/{1 / CODING_ERROR_PX:g} px"
+        at_m, nearest_m = _TOLD_AT_M**2 / depth_px * CODING_ERROR_PX, depth_px / LARGEST_PX
+        found.append(f"{coded}, {at_m:.3f} m at {_TOLD_AT_M:g} m; what is nearer than {nearest_m:.2f} m has none")
+    return found
+
+
+SOURCE = Source(
+    options=Ros2Options,
+    convert=convert_bags,
+    help=_HELP,
+    example="semgrid-eval convert ros2 drive logs --map map.yaml",
+    inspect=inspect,
+)

@@ -1,0 +1,125 @@
+"""Which pictures make a frame, and which frames make a recording: by stamps alone."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.motion import EXTRAPOLATION_LIMIT_S
+from semgrid_eval.sources.ros2.arrivals import Arrivals
+from semgrid_eval.sources.ros2.mapping import CameraMap
+
+_HOLE_PERIODS = 1.5
+_LEAST_FRAMES = 2
+_NS_PER_S = 1e9
+Stamps = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One picture of a frame."""
+
+    topic: str
+    stamp_ns: int
+    received_ns: int
+    digest: int
+
+
+@dataclass(frozen=True)
+class FramePlan:
+    """One frame of a camera: its time, and its pictures by what they are."""
+
+    camera: str
+    stamp_ns: int
+    pieces: dict[str, Piece]
+
+
+def frames_of(
+    name: str, camera: CameraMap, arrivals: Mapping[str, Arrivals], tolerance_s: float, lost: Counter[str]
+) -> list[FramePlan]:
+    """Return the frames of a camera that have all pictures that the map names; `lost` counts what the others lack.
+
+    Raises:
+        InputError: no frame has all.
+    """
+    base = arrivals[camera.depth_topic]
+    pictures = camera.pictures()
+    places = {what: arrivals[topic].nearest(base.stamps_ns) for what, topic in pictures.items()}
+    whole = np.ones(len(base.stamps_ns), np.bool_)
+    for what, topic in pictures.items():
+        apart_ns = np.abs(arrivals[topic].stamps_ns[places[what]] - base.stamps_ns)
+        found = apart_ns <= tolerance_s * _NS_PER_S
+        if not found.any():
+            nearest_s = apart_ns.min() / _NS_PER_S
+            message = f"none is within {tolerance_s:g} s of {camera.depth_topic}; the nearest is {nearest_s:.3f} s away"
+            raise InputError(f"{message} (tolerance_s in the map)", field=topic)
+        lost[f"without {what}"] += int((whole & ~found).sum())
+        whole &= found
+    kept = np.flatnonzero(whole)
+    pieces = ({what: _piece(arrivals[pictures[what]], places[what][at]) for what in pictures} for at in kept)
+    return [FramePlan(name, int(base.stamps_ns[at]), each) for at, each in zip(kept, pieces, strict=True)]
+
+
+def _piece(arrivals: Arrivals, at: np.intp) -> Piece:
+    columns = (arrivals.stamps_ns, arrivals.received_ns, arrivals.digests)
+    return Piece(arrivals.topic, *(int(each[at]) for each in columns))
+
+
+def covered(frames: Sequence[FramePlan], motion_ns: Stamps, lost: Counter[str]) -> list[FramePlan]:
+    """Return the frames that have motion near, before and after them but at the ends; `lost` counts the others."""
+    stamps_ns = np.array([frame.stamp_ns for frame in frames], np.int64)
+    before = np.maximum(np.searchsorted(motion_ns, stamps_ns, side="right") - 1, 0)
+    after = np.minimum(np.searchsorted(motion_ns, stamps_ns, side="left"), len(motion_ns) - 1)
+    limit_ns = EXTRAPOLATION_LIMIT_S * _NS_PER_S
+    near = np.abs(stamps_ns - motion_ns[before]) <= limit_ns
+    near &= np.abs(motion_ns[after] - stamps_ns) <= limit_ns
+    lost["without motion"] += int((~near).sum())
+    return [frame for frame, keep in zip(frames, near, strict=True) if keep]
+
+
+def stretches(
+    by_camera: Mapping[str, Sequence[FramePlan]], longest_s: float, lost: Counter[str]
+) -> list[tuple[int, list[FramePlan]]]:
+    """Cut the frames of all cameras where one of them has a hole, and into parts of at most `longest_s`.
+
+    Windows count frames, so no recording may have a hole. Each stretch comes with the number of its first frame, as
+    the first camera counts them. `lost` counts the frames of stretches of a single frame.
+    """
+    numbers, *others = [np.array([each.stamp_ns for each in frames], np.int64) for frames in by_camera.values()]
+    cuts_ns = {cut_ns for stamps_ns in (numbers, *others) for cut_ns in _holes(stamps_ns)}
+    everything = sorted((each for frames in by_camera.values() for each in frames), key=_order)
+    if not everything:
+        return []
+    ends_ns = (everything[0].stamp_ns, *sorted(cuts_ns), everything[-1].stamp_ns + 1)
+    found = []
+    for start_ns, end_ns in (part for pair in pairwise(ends_ns) for part in _parts(*pair, longest_s)):
+        frames = [each for each in everything if start_ns <= each.stamp_ns < end_ns]
+        counts = Counter(each.camera for each in frames)
+        if all(counts[camera] >= _LEAST_FRAMES for camera in by_camera):
+            found.append((int(np.searchsorted(numbers, frames[0].stamp_ns)), frames))
+        else:
+            lost["alone between holes"] += len(frames)
+    return found
+
+
+def _order(frame: FramePlan) -> tuple[int, str]:
+    return frame.stamp_ns, frame.camera
+
+
+def _holes(stamps_ns: Stamps) -> list[int]:
+    """Return the stamps before which frames are missing."""
+    steps_ns = np.diff(stamps_ns)
+    if not len(steps_ns):
+        return []
+    return [int(each) for each in stamps_ns[1:][steps_ns > _HOLE_PERIODS * np.median(steps_ns)]]
+
+
+def _parts(start_ns: int, end_ns: int, longest_s: float) -> list[tuple[int, int]]:
+    """Cut a span into equal parts that are no longer than asked for; 0 leaves it whole."""
+    count = max(1, -int(-(end_ns - start_ns) // (longest_s * _NS_PER_S))) if longest_s else 1
+    bounds = [start_ns + (end_ns - start_ns) * part // count for part in range(count + 1)]
+    return list(pairwise(bounds))

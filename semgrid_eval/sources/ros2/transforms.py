@@ -1,0 +1,120 @@
+"""Where frames are in the vehicle, from the transforms in a bag."""
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
+from semgrid_eval.sources.ros2.mapping import Extrinsics
+
+_STILL_M, _STILL = 1e-3, 1e-3  # how much a link may change, its rotation in elements of the matrix (about radians)
+
+
+class Transforms:
+    """The links between frames that a bag tells; each is what was heard first, and some are known to move."""
+
+    def __init__(self) -> None:
+        self._links: dict[tuple[str, str], SE3] = {}
+        self._moving: set[tuple[str, str]] = set()
+
+    def add(self, message: Any) -> None:  # noqa: ANN401 - a class that rosbags makes
+        """Take in a TFMessage."""
+        for each in message.transforms:
+            key = (_plain(each.header.frame_id), _plain(each.child_frame_id))
+            found = _se3(each.transform)
+            known = self._links.setdefault(key, found)
+            if known is not found and not _same(known, found):
+                self._moving.add(key)
+
+    def lookup(self, parent: str, child: str) -> SE3:
+        """Return parent_from_child.
+
+        Raises:
+            InputError: nothing links the frames, or what does moves.
+        """
+        path = self._path(_plain(parent), _plain(child))
+        if path is None:
+            known = ", ".join(f"{one} -> {other}" for one, other in sorted(self._links)) or "none"
+            raise InputError(f"no link from {parent} to {child}; there are: {known}", field="tf")
+        result = SE3(np.eye(3), np.zeros(3))
+        for key, forward in path:
+            if key in self._moving:
+                raise InputError(f"the link {key[0]} -> {key[1]} moves; a sensor has to be fixed", field="tf")
+            result = result @ (self._links[key] if forward else self._links[key].inverse())
+        return result
+
+    def has(self, parent: str, child: str) -> bool:
+        """Tell whether `lookup` finds something."""
+        try:
+            self.lookup(parent, child)
+        except InputError:
+            return False
+        return True
+
+    @property
+    def frames(self) -> set[str]:
+        """The names of all frames."""
+        return {name for key in self._links for name in key}
+
+    def _path(self, parent: str, child: str) -> list[tuple[tuple[str, str], bool]] | None:
+        """Find the shortest way along links, each with whether it leads from parent to child."""
+        ways: dict[str, list[tuple[tuple[str, str], bool]]] = {parent: []}
+        waiting = deque([parent])
+        while waiting and child not in ways:
+            here = waiting.popleft()
+            for key in self._links:
+                for start, end, forward in ((*key, True), (*key[::-1], False)):
+                    if start == here and end not in ways:
+                        ways[end] = [*ways[here], (key, forward)]
+                        waiting.append(end)
+        return ways.get(child)
+
+
+def extrinsics_of(vehicle_from_optical: SE3) -> Extrinsics:
+    """Return place and angles of a camera whose optical frame is there: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    vehicle_from_camera = vehicle_from_optical @ CAMERA_FROM_OPTICAL.inverse()
+    turn, (x_m, y_m, z_m) = vehicle_from_camera.rotation, vehicle_from_camera.translation_m
+    return Extrinsics(
+        x_m=float(x_m),
+        y_m=float(y_m),
+        z_m=float(z_m),
+        roll_rad=float(np.arctan2(turn[2, 1], turn[2, 2])),
+        pitch_rad=float(-np.arcsin(np.clip(turn[2, 0], -1.0, 1.0))),
+        yaw_rad=float(np.arctan2(turn[1, 0], turn[0, 0])),
+    )
+
+
+def rotation_of(quaternion: Any) -> np.ndarray[Any, np.dtype[np.float64]]:  # noqa: ANN401
+    """Return the rotation (3, 3) of a quaternion, which need not be normalised.
+
+    Raises:
+        InputError: it is zero or not finite.
+    """
+    x, y, z, w = (float(getattr(quaternion, name)) for name in "xyzw")
+    norm = x * x + y * y + z * z + w * w
+    if not (np.isfinite(norm) and norm > 0):
+        raise InputError(f"({x:g}, {y:g}, {z:g}, {w:g}) is not a rotation", field="quaternion")
+    s = 2.0 / norm
+    return np.array(
+        [
+            [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
+            [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
+            [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
+        ]
+    )
+
+
+def _se3(transform: Any) -> SE3:  # noqa: ANN401
+    place = transform.translation
+    return SE3(rotation_of(transform.rotation), np.array([place.x, place.y, place.z], np.float64))
+
+
+def _same(one: SE3, other: SE3) -> bool:
+    apart_m = np.abs(one.translation_m - other.translation_m).max()
+    return bool(apart_m <= _STILL_M and np.abs(one.rotation - other.rotation).max() <= _STILL)
+
+
+def _plain(frame: str) -> str:
+    return frame.removeprefix("/")
