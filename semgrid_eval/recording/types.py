@@ -1,7 +1,7 @@
 """What every source yields and every log holds: calibrated camera frames, motion samples and, truth where known."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from typing import NamedTuple
 
@@ -9,6 +9,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
 from semgrid_eval.motion import MotionSample as MotionSample
 from semgrid_eval.motion import Pose as Pose
+from semgrid_eval.recording.lidar import LidarSweep
 
 
 @dataclass(frozen=True)
@@ -87,13 +88,14 @@ class CameraFrame:
 
 @dataclass(frozen=True)
 class Moment:
-    """Everything a source knows of one time stamp: a frame for each camera that has one, motion and truth."""
+    """Everything a source knows of one time stamp: frames and sweeps of what saw something then, motion and truth."""
 
     stamp_ns: int
     cameras: dict[str, CameraFrame]
     motion: tuple[MotionSample, ...] = ()  # samples since the last moment
     pose: Pose | None = None
     actors: tuple[Actor, ...] | None = None
+    sweeps: Mapping[str, LidarSweep] = field(default_factory=dict)  # by LiDAR
 
 
 class Quantity(NamedTuple):
