@@ -13,7 +13,9 @@ from semgrid_eval.log.container import Container, damage_as_log_error
 from semgrid_eval.log.recovered import Recovered
 from semgrid_eval.log.sweeps import read_sweep
 from semgrid_eval.log.topics import camera_topic, lidar_topic
+from semgrid_eval.recording import road_map
 from semgrid_eval.recording.lidar import LidarSweep
+from semgrid_eval.recording.road_map import RoadMap
 from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Quantity
 
 T = TypeVar("T")
@@ -144,6 +146,14 @@ class LogReader(Container):
     def actors(self) -> Iterator[tuple[int, tuple[Actor, ...]]]:
         """Iterate over time stamps (ns) and the true boxes of all actors; nothing where the truth is not known."""
         return self._values(topics.TRUE_ACTORS, codec.read_actors)
+
+    def road_map(self) -> RoadMap | None:
+        """Return the map around the drive; None where the log has none."""
+        data = self.attachments().get(road_map.FILE)
+        if data is None:
+            return None
+        with damage_as_log_error(self.path):
+            return RoadMap.from_json(data)
 
     def moments(self) -> Iterator[Moment]:
         """Iterate over all that the log holds, in the order of time.

@@ -12,6 +12,7 @@ from semgrid_eval.config import of_kind
 from semgrid_eval.sensors.camera import CameraSensor, read_cameras
 from semgrid_eval.sensors.lidar import LidarSensor, read_lidars
 from semgrid_eval.sensors.sensor import Kind, Points, SensorConfig
+from semgrid_eval.sensors.tracks import TracksSensor, read_tracks
 
 if TYPE_CHECKING:
     from semgrid_eval.log.reader import LogReader
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 KINDS: dict[str, Kind] = {
     "camera": Kind(CameraSensor, read_cameras),
     "lidar": Kind(LidarSensor, read_lidars),
+    "tracks": Kind(TracksSensor, read_tracks),
 }
 _DEFAULT_KIND = "camera"
 TOLERANCE_NS = 1_000_000

@@ -41,6 +41,7 @@ class Known(NamedTuple):
 SOURCES = {
     "cityscapes": Known("semgrid_eval.sources.cityscapes.tree:SOURCE"),
     "synthetic": Known("semgrid_eval.sources.town.convert:SOURCE", extra="synthetic"),
+    "argoverse2": Known("semgrid_eval.sources.argoverse2.convert:SOURCE", extra="argoverse"),
     "kitti": Known("semgrid_eval.sources.kitti.convert:SOURCE"),
     "ros2": Known("semgrid_eval.sources.ros2.convert:SOURCE", extra="ros"),
     "town-v1": Known("semgrid_eval.sources.town.convert:TOWN_V1", extra="synthetic"),
