@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-import cv2
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 LONGEST_M = 200.0
 """No actor is longer or wider; a tram of seven parts is not half as long."""
-_SUBPIXEL_BITS = 4
-_FARTHEST_CELLS = 1 << 20
 Floats = NDArray[np.float64]
 
 
@@ -110,14 +108,12 @@ class _Sampler:
             self._fill(ground, vehicle_from_map.apply(np.array(polygon)), 1)
         for corners_m in hidden:
             self._fill(ground, corners_m, 0)
-        return (np.argwhere(ground) + 0.5) * self.sensor.spacing_m - self.sensor.range_m
+        middles = np.argwhere(ground).astype(np.float64) + 0.5
+        return middles * self.sensor.spacing_m - self.sensor.range_m
 
     def _fill(self, ground: NDArray[np.uint8], corners_m: Floats, value: int) -> None:
         """Fill a polygon (K, 2) in the vehicle frame; rows are ahead, columns left."""
-        cells = (corners_m[:, ::-1] + self.sensor.range_m) / self.sensor.spacing_m - 0.5
-        bounded = np.clip(cells, -_FARTHEST_CELLS, _FARTHEST_CELLS)
-        corners = np.rint(bounded * (1 << _SUBPIXEL_BITS)).astype(np.int32)
-        cv2.fillPoly(ground, [corners], value, shift=_SUBPIXEL_BITS)
+        _fill_polygon((corners_m + self.sensor.range_m) / self.sensor.spacing_m, value, ground)
 
 
 def _corners_m(actor: Actor) -> Floats:
@@ -130,3 +126,24 @@ def _middles_m(side_m: float, spacing_m: float) -> Floats:
     """Cut a side into equal parts of at most a length, and return their middles, from that of the side."""
     count = max(1, math.ceil(side_m / spacing_m))
     return np.asarray(((np.arange(count) + 0.5) / count - 0.5) * side_m, np.float64)
+
+
+@numba.njit(cache=True, nogil=True)
+def _fill_polygon(corners, value, ground):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Set what lies in a polygon, corners (K, 2): cells whose middles are inside (even-odd rule)."""
+    rows, columns = ground.shape
+    count = len(corners)
+    crossings = np.empty(count)
+    first_row = int(min(max(np.floor(corners[:, 0].min()), 0.0), rows))
+    end_row = int(min(max(np.ceil(corners[:, 0].max()), 0.0), rows))
+    for row in range(first_row, end_row):
+        found = 0
+        for k in range(count):
+            (row0, column0), (row1, column1) = corners[k], corners[(k + 1) % count]
+            if (row0 <= row + 0.5) != (row1 <= row + 0.5):
+                crossings[found] = column0 + (row + 0.5 - row0) / (row1 - row0) * (column1 - column0)
+                found += 1
+        ends = np.minimum(np.maximum(np.ceil(np.sort(crossings[:found]) - 0.5), 0.0), float(columns))
+        for pair in range(0, found - 1, 2):
+            for column in range(int(ends[pair]), int(ends[pair + 1])):
+                ground[row, column] = value
