@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from support.swept import START_NS, recorded
 
 from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, UNKNOWN
@@ -15,6 +16,7 @@ from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.road_map import FILE, RoadMap
 from semgrid_eval.recording.types import Actor, Moment, MotionSample, Pose
 from semgrid_eval.sensors.tracks import TracksSensor
+from semgrid_eval.windows.grids import shift_grids, shift_in_cells
 
 ROAD, CAR, PERSON = (CLASS_NAMES.index(name) for name in ("road", "car", "person"))
 SPEC = GridSpec(rows=100, columns=100, cell_m=0.5, agent_row=90, agent_column=50)
@@ -138,3 +140,16 @@ def test_a_log_without_actors_gives_no_grid(tmp_path):
     write_log(recorded(lambda: iter([moment])), tmp_path / "log.mcap")
     with pytest.raises(LogError, match=r"log\.mcap: sensor tracks has no frames$"):
         build_log(tmp_path / "log.mcap", GridConfig(sensors={"tracks": TracksSensor()}, target=("tracks",)))
+
+
+def test_motion_of_the_wrong_sign_is_worse_than_none_and_the_right_one_is_best(tmp_path):
+    standing = [box(ahead_m, left_m, actor_id=k) for k, (ahead_m, left_m) in enumerate([(30, 5), (20, -6), (12, 2)], 1)]
+    grids = torch.from_numpy(grids_of(tmp_path, *[standing] * 7))
+    way_m = np.array([0.5 * 6, 0.0])
+    share = {}
+    for sign in (1, 0, -1):
+        moved = shift_grids(grids[0], torch.from_numpy(shift_in_cells(sign * way_m, SPEC.cell_m)))
+        both = (moved == CAR) & (grids[6] == CAR)
+        share[sign] = float(both.sum() / ((moved == CAR) | (grids[6] == CAR)).sum())
+    assert share[1] == 1.0
+    assert share[1] > share[0] > share[-1]

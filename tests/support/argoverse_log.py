@@ -21,10 +21,10 @@ def ego(number: int) -> tuple[float, float]:
     return CITY_M[0] + way_m * math.cos(YAW_RAD), CITY_M[1] + way_m * math.sin(YAW_RAD)
 
 
-def columns() -> dict[str, list[Any]]:
+def columns(frames: int = FRAMES) -> dict[str, list[Any]]:
     """The boxes, row by row in the order of time."""
     found: dict[str, list[Any]] = {}
-    for number in range(FRAMES):
+    for number in range(frames):
         since_s = number * STEP_NS * 1e-9
         ahead_m = {
             "a-car": 20.0 + (CAR_MPS - EGO_MPS) * since_s,
@@ -51,9 +51,9 @@ def columns() -> dict[str, list[Any]]:
     return found
 
 
-def pose_columns() -> dict[str, list[Any]]:
+def pose_columns(frames: int = FRAMES) -> dict[str, list[Any]]:
     """Poses, twice as often as there are boxes."""
-    numbers = np.arange(0, FRAMES, 0.5)
+    numbers = np.arange(0, frames, 0.5)
     turn = {"qw": math.cos(YAW_RAD / 2), "qx": 0.0, "qy": 0.0, "qz": math.sin(YAW_RAD / 2)}
     return {
         "timestamp_ns": [START_NS + int(number * STEP_NS) for number in numbers],
@@ -82,11 +82,13 @@ def write_table(path: Path, content: dict[str, list[Any]]) -> None:
     feather.write_feather(pa.table(content), path)
 
 
-def write_argoverse(root: Path, name: str = "drive", split: str = "val", *, sweeps: bool = False) -> Path:
+def write_argoverse(
+    root: Path, name: str = "drive", split: str = "val", *, frames: int = FRAMES, sweeps: bool = False
+) -> Path:
     """Write a log, and return its folder."""
     folder = root / split / name
-    write_table(folder / "annotations.feather", columns())
-    write_table(folder / "city_SE3_egovehicle.feather", pose_columns())
+    write_table(folder / "annotations.feather", columns(frames))
+    write_table(folder / "city_SE3_egovehicle.feather", pose_columns(frames))
     (folder / "map").mkdir()
     (folder / "map" / f"log_map_archive_{name}____PIT_city_1.json").write_text(json.dumps(city_map()))
     if sweeps:
