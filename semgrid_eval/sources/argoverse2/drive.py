@@ -1,5 +1,6 @@
 """One log of Argoverse as a recording: its files, their digest, and the moments they hold."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ LIDAR = "top"
 """Name in logs of the two scanners on the roof, whose sweeps come as one."""
 _IN_VEHICLE = Mount.of(SE3(np.eye(3), np.zeros(3)))  # where Argoverse gives the points of a sweep
 _POINTS = {**dict.fromkeys(("x", "y", "z"), "float64"), "intensity": "float64"}
+_STAMP = re.compile(r"[0-9]{1,19}")
 _CONVERSION_VERSION = 1  # to be raised when the same files give another recording
 
 
@@ -41,7 +43,7 @@ class Drive:
     def sweeps(self) -> dict[int, Path]:
         """The files of the LiDAR's sweeps by time."""
         found = (self.folder / "sensors" / "lidar").glob("*.feather")
-        return {int(path.stem): path for path in sorted(found) if path.stem.isdigit()}
+        return {int(path.stem): path for path in sorted(found) if _STAMP.fullmatch(path.stem)}
 
     def digest(self) -> str:
         """Digest the bytes of all files that are used."""

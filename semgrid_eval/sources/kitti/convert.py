@@ -9,6 +9,7 @@ SRC/sequences/<NN>/image_2, image_3     rectified colour images, where both are 
 """
 
 import math
+import re
 from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
@@ -36,6 +37,7 @@ Logs whose inputs have not changed are left as they are.
 _LONGEST = "Longest recording in seconds; each sequence is cut into equal parts.  0: it stays whole."
 _PLACE = "Camera 0 (left, grey): metres ahead of the rear axle, left of the middle and above the ground."
 _LEAST_FRAMES = 2
+_NUMBER = re.compile(r"[0-9]{6}")
 
 
 class KittiOptions(Config):
@@ -103,7 +105,7 @@ def _sequence(folder: Path, options: KittiOptions) -> KittiSequence:
 
 def _numbers(folder: Path, channel: str) -> list[int]:
     found = (folder / channel).glob("*.bin" if channel == "velodyne" else "*.png")
-    return sorted(int(path.stem) for path in found if path.stem.isdigit())
+    return sorted(int(path.stem) for path in found if _NUMBER.fullmatch(path.stem))
 
 
 def _parts(sequence: KittiSequence, options: KittiOptions) -> Iterator[Part]:
