@@ -36,7 +36,7 @@ def check_log(path: Path, contract: Contract | None = None) -> LogReport:
         with LogReader(path) as log:
             log.verify()
             conditions = log.conditions()
-            log.attachments()
+            log.road_map()  # which reads all attachments
             timeline = _timeline(log, expected)
             for finding in _findings(log, expected, timeline):  # one by one: those before damage count as well
                 findings.append(finding)

@@ -59,7 +59,7 @@ class Actor:
     """The true box of another road user in the map frame of `Pose`; x, y is the centre of its footprint."""
 
     actor_id: int  # equals the instance value of its pixels
-    label_id: int  # Cityscapes label id
+    label_id: int  # Cityscapes label id; `unlabeled` where sensors saw nothing of it at that time
     x_m: float
     y_m: float
     yaw_rad: float

@@ -10,12 +10,12 @@ import heapq
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Self
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from semgrid_eval.classes import LABEL_ID, NO_POINT
 from semgrid_eval.errors import LogError
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 LONGEST_M = 200.0
 """No actor is longer or wider; a tram of seven parts is not half as long."""
+_MOST_POINTS = 2500  # ahead, behind, left and right
 Floats = NDArray[np.float64]
 
 
@@ -40,6 +41,12 @@ class TracksSensor(SensorConfig):
     morphology: Morphology | None = Field("off")  # outlines are exact already
     range_m: float = Field(120.0, gt=0.0, le=500.0)  # how far the ground is known ahead, behind, left and right
     spacing_m: float = Field(0.2, ge=0.05, le=1.0)  # of points, at most
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Self:
+        if self.range_m > _MOST_POINTS * self.spacing_m:
+            raise ValueError(f"range_m {self.range_m:g} is more than {_MOST_POINTS} times spacing_m {self.spacing_m:g}")
+        return self
 
 
 def read_tracks(

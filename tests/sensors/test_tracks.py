@@ -9,9 +9,11 @@ import torch
 from support.swept import START_NS, recorded
 
 from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, UNKNOWN
-from semgrid_eval.errors import LogError
+from semgrid_eval.config import parse_config
+from semgrid_eval.errors import ConfigError, LogError
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.log.check import check_log
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.road_map import FILE, RoadMap
 from semgrid_eval.recording.types import Actor, Moment, MotionSample, Pose
@@ -133,6 +135,18 @@ def test_a_log_without_poses_or_with_a_broken_map_is_refused_in_a_line(tmp_path)
     write_log(replace(recorded(lambda: iter([moment])), source_files={FILE: b"[]"}), tmp_path / "log.mcap")
     with pytest.raises(LogError, match=r"log\.mcap: is damaged: a map has the keys drivable and crossings$"):
         build_log(tmp_path / "log.mcap", config)
+
+
+def test_ground_has_a_bound():
+    with pytest.raises(ConfigError, match=r"range_m 400 is more than 2500 times spacing_m 0\.1"):
+        parse_config(TracksSensor, {"range_m": 400, "spacing_m": 0.1})
+
+
+def test_a_broken_map_is_found_by_a_check(tmp_path):
+    moment = Moment(START_NS, {}, (MotionSample(START_NS, 0.0, 0.0),), None, (box(12.0, 3.0),))
+    write_log(replace(recorded(lambda: iter([moment])), source_files={FILE: b"{}"}), tmp_path / "log.mcap")
+    (fault,) = [each for each in check_log(tmp_path / "log.mcap").findings if each.place == "file"]
+    assert fault.message == "is damaged: a map has the keys drivable and crossings"
 
 
 def test_a_log_without_actors_gives_no_grid(tmp_path):
