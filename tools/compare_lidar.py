@@ -1,9 +1,10 @@
 """Hold grids of a labelled LiDAR against a camera's of the same drive, and against those of the same LiDAR later on.
 
-Prints two tables (Markdown). The first has the share of cells of equal class among those that both sensors know, by
-range, and the same of cells to which both give a static class. The second has, within 30 m, the share of cells of equal
-class among those that two grids of the LiDAR know and give a static class, the earlier one moved by the true poses,
-left where it was, and moved the wrong way.
+Prints three tables (Markdown). The first has the share of cells of equal class among those that both sensors know, by
+range, and the same of cells to which both give a static class. The second has what the camera says of the LiDAR's cells
+of a class, the commonest three. The third has, within 30 m, the share of cells of equal class among those that two grids
+of the LiDAR know and give a static class, the earlier one moved by the true poses, left where it was, and moved the
+wrong way.
 
 Example: python tools/compare_lidar.py logs/05_000000.mcap=cameras/kitti05_000000_000000.mcap
 """
@@ -17,7 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, UNKNOWN, category_members
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN, category_members
 from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.build import build_log
@@ -31,6 +32,7 @@ from semgrid_eval.windows.grids import shift_grids, shift_in_cells
 RANGES_M = ((0, 10), (10, 20), (20, 30), (30, 40), (40, 60))
 STEP_FRAMES = 3  # 0.3 s at 10 Hz
 WITHIN_M = 30.0
+LEAST_CELLS = 100  # of a class that is told
 _SAME_NS = 1_000_000
 LIDAR = GridConfig(sensors={"lidar": LidarSensor()}, target=("lidar",), stretch_frames=100_000)
 CAMERA = GridConfig(sensors={"camera": CameraSensor()}, target=("camera",), stretch_frames=100_000)
@@ -48,6 +50,8 @@ def main() -> None:
         pairs = [_paths(each) for each in parser.parse_args().pairs]
         _print_beside_cameras(pairs)
         print()
+        _print_confusions(pairs)
+        print()
         _print_steadiness([lidar for lidar, _ in pairs])
     except SemgridError as error:
         parser.exit(1, f"Error: {error}\n")
@@ -63,13 +67,25 @@ def _paths(text: str) -> tuple[Path, Path]:
 def _print_beside_cameras(pairs: list[tuple[Path, Path]]) -> None:
     print("| drive | range | both know | equal class | both static | equal class |\n|---|---|---|---|---|---|")
     for lidar_log, camera_log in pairs:
-        lidar, camera = (build_log(*each)[0] for each in ((lidar_log, LIDAR), (camera_log, CAMERA)))
-        ours, theirs = _at_the_same_times(lidar, camera)
+        ours, theirs = _grids_of(lidar_log, camera_log)
         for low_m, high_m in RANGES_M:
             within = _between(low_m, high_m) & (ours != UNKNOWN) & (theirs != UNKNOWN)
             static = within & _STATIC[ours] & _STATIC[theirs]
             told = " | ".join(f"{each.sum():,} | {_share(ours, theirs, each)}" for each in (within, static))
             print(f"| {lidar_log.stem} | {low_m} to {high_m} m | {told} |")
+
+
+def _print_confusions(pairs: list[tuple[Path, Path]]) -> None:
+    print("| drive | LiDAR says | cells | camera says |\n|---|---|---|---|")
+    for lidar_log, camera_log in pairs:
+        ours, theirs = _grids_of(lidar_log, camera_log)
+        both = (ours != UNKNOWN) & (theirs != UNKNOWN)
+        for class_id in np.unique(ours[both]):
+            found = np.bincount(theirs[both & (ours == class_id)], minlength=CLASS_COUNT)
+            if found.sum() >= LEAST_CELLS:
+                shares = [(CLASS_NAMES[each], 100 * found[each] / found.sum()) for each in found.argsort()[:-4:-1]]
+                told = ", ".join(f"{name} {share:.0f} %" for name, share in shares)
+                print(f"| {lidar_log.stem} | {CLASS_NAMES[class_id]} | {found.sum():,} | {told} |")
 
 
 def _print_steadiness(logs: list[Path]) -> None:
@@ -81,6 +97,11 @@ def _print_steadiness(logs: list[Path]) -> None:
         found = [_steadiness(recording, sign * place_m) for sign in (1.0, 0.0, -1.0)]
         told = " | ".join(f"{100 * equal / count:.1f} %" for equal, count in found)
         print(f"| {log.stem} | {found[0][1]:,} | {told} |")
+
+
+def _grids_of(lidar_log: Path, camera_log: Path) -> tuple[Cells, Cells]:
+    lidar, camera = (build_log(*each)[0] for each in ((lidar_log, LIDAR), (camera_log, CAMERA)))
+    return _at_the_same_times(lidar, camera)
 
 
 def _at_the_same_times(lidar: GridRecording, camera: GridRecording) -> tuple[Cells, Cells]:
