@@ -2,9 +2,9 @@
 
 Prints three tables (Markdown). The first has the share of cells of equal class among those that both sensors know, by
 range, and the same of cells to which both give a static class. The second has what the camera says of the LiDAR's cells
-of a class, the commonest three. The third has, within 30 m, the share of cells of equal class among those that two grids
-of the LiDAR know and give a static class, the earlier one moved by the true poses, left where it was, and moved the
-wrong way.
+of a class, the commonest three. The third has, within 30 m, the share of cells of equal class among those that two
+grids of the LiDAR know and give a static class, the earlier one moved by the true poses, left where it was, and moved
+the wrong way.
 
 Example: python tools/compare_lidar.py logs/05_000000.mcap=cameras/kitti05_000000_000000.mcap
 """
