@@ -63,6 +63,11 @@ class SE3:
         ]
         return cls(np.array(rotation), np.array(translation_m, np.float64))
 
+    @classmethod
+    def from_quaternion(cls, quaternion: Quaternion, translation_m: tuple[float, float, float]) -> Self:
+        """Return the turn of a quaternion at a place; errors as `rotation_of`."""
+        return cls(rotation_of(quaternion), np.array(translation_m, np.float64))
+
     def __matmul__(self, other: "SE3") -> "SE3":
         """Chain transforms: a_from_b @ b_from_c is a_from_c."""
         return SE3(self.rotation @ other.rotation, self.apply(other.translation_m))
@@ -89,6 +94,41 @@ def optical_quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Qua
     """
     turned = _product(_product(_about(2, yaw_rad), _about(1, pitch_rad)), _about(0, roll_rad))
     return _product(turned, _CAMERA_FROM_OPTICAL_QUATERNION)
+
+
+def rotation_of(quaternion: Quaternion) -> Floats:
+    """Return the rotation (3, 3) of a quaternion, which need not be normalised.
+
+    Raises:
+        ValueError: it is zero or not finite.
+    """
+    x, y, z, w = quaternion
+    norm = x * x + y * y + z * z + w * w
+    if not (math.isfinite(norm) and norm > 0):
+        raise ValueError(f"({x:g}, {y:g}, {z:g}, {w:g}) is not a rotation")
+    s = 2.0 / norm
+    return np.array(
+        [
+            [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
+            [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
+            [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_of(rotation: Floats) -> Quaternion:
+    """Return the quaternion of a rotation (3, 3), its largest part positive (Shepperd's method)."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
+    columns = (
+        (1 + a - e - i, b + d, c + g, h - f),  # each is the quaternion (x, y, z, w), times four of one of its parts
+        (b + d, 1 - a + e - i, f + h, c - g),
+        (c + g, f + h, 1 - a - e + i, d - b),
+        (h - f, c - g, d - b, 1 + a + e + i),
+    )
+    largest = max(range(4), key=lambda part: columns[part][part])
+    x, y, z, w = columns[largest]
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    return x / length, y / length, z / length, w / length
 
 
 def _about(axis: int, angle_rad: float) -> Quaternion:

@@ -43,6 +43,7 @@ ALLOWED_IN = {
     "sumo": {"sources"},
     "trimesh": {"sources"},
     "rosbags": {"sources"},
+    "pyarrow": {"sources"},
 }
 
 

@@ -74,7 +74,7 @@ are values outside of the limits.*
 LOGS = """## Logs
 
 Logs are MCAP files with Protobuf messages, of Foxglove's types where there is one and of `schemas/` else. `{camera}`
-is a camera's name.
+is a camera's name, `{lidar}` a LiDAR's.
 
 | topic | type | what it holds |
 |---|---|---|
@@ -86,7 +86,9 @@ is a camera's name.
 | `/ego/motion` | `semgrid.v1.EgoMotion` | speed and yaw rate as reported |
 | `/ego/pose` | `foxglove.PoseInFrame` | integrated from these, to look at |
 | `/tf` | `foxglove.FrameTransform` | `odom` to `base_link` (ISO 8855), and to each camera |
+| `/lidar/{lidar}/points` | `foxglove.PointCloud` | points with labels ([fields](lidar.md#what-a-log-holds)) |
 | `/truth/...`, `/camera/{camera}/truth/...` | | on simulated logs: exact labels, disparity, instances, pose, actors |
+| `/truth/pose`, `/truth/actors` | | also on logs of others, where annotators tell them |
 
 Recordings are the log's metadata `recording`. What a log has to hold is also `check --print-spec` ([check](check.md)).
 

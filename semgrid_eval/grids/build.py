@@ -14,7 +14,7 @@ from semgrid_eval.executors import Executor, InProcess, WorkerDied
 from semgrid_eval.files import digest_value
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.actors import TrueActors
-from semgrid_eval.grids.rasterise import Cells, add_points, no_points, rasterise
+from semgrid_eval.grids.rasterise import Cells, grid_of
 from semgrid_eval.grids.recording import FORMAT_VERSION, GridRecording, read_recordings, write_recordings
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
@@ -166,13 +166,12 @@ class _Stretch:
         )
 
     def _grid(self, seen: Iterable[Points], here: SE2) -> Cells:
-        counts = no_points(self._config.spec)
-        for points in seen:
-            there = self._first_from_vehicle(points.stamp_ns)
-            # Where both times are the same, points are turned alone.
-            grid_from_points = SE2(there.x_m - here.x_m, there.y_m - here.y_m, there.yaw_rad)
-            add_points(counts, points, grid_from_points, self._config.spec)
-        return rasterise(counts, self._config.morphology)
+        return grid_of(((points, self._grid_from(points, here)) for points in seen), self._config)
+
+    def _grid_from(self, points: Points, here: SE2) -> SE2:
+        there = self._first_from_vehicle(points.stamp_ns)
+        # Where both times are the same, points are turned alone.
+        return SE2(there.x_m - here.x_m, there.y_m - here.y_m, there.yaw_rad)
 
     def _first_from_vehicle(self, stamp_ns: int) -> SE2:
         self._motion.check_cover(stamp_ns)

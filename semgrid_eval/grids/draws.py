@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import UnknownTruthError
 from semgrid_eval.geometry import SE2
-from semgrid_eval.grids.rasterise import add_points, no_points, rasterise
+from semgrid_eval.grids.rasterise import grid_of
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import FrameLog, WindowTimes, plain_png
 from semgrid_eval.log.reader import LogReader
@@ -118,9 +118,6 @@ def _votes(log: LogReader, config: GridConfig, drawn: Iterable[Pictures], place:
         ):
             by_draw[points.stamp_ns].append(points)
             if len(by_draw[points.stamp_ns]) == len(config.target):
-                counts = no_points(config.spec)
-                for seen in by_draw.pop(points.stamp_ns):
-                    add_points(counts, seen, place, config.spec)
-                grid = rasterise(counts, config.morphology)
+                grid = grid_of(((seen, place) for seen in by_draw.pop(points.stamp_ns)), config)
                 votes += grid == np.arange(CLASS_COUNT, dtype=np.uint8)[:, None, None]
     return votes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import CLASSES, Category
 from semgrid_eval.errors import UnknownTruthError
 from semgrid_eval.geometry import SE2
-from semgrid_eval.grids.rasterise import Cells, add_points, no_points, rasterise
+from semgrid_eval.grids.rasterise import Cells, grid_of
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.grids.truth import FrameLog, WindowTimes
 from semgrid_eval.log.reader import LogReader
@@ -150,18 +150,16 @@ def _by_id(actors: Sequence[Actor]) -> dict[int, SE2]:
 
 def _arrived(points: Points, movers: Mover, config: GridConfig) -> Cells:
     """Make a grid (H, W) of the points of those who move, where they come to lie."""
-    there_m, counts = movers.end_m[movers.moves], no_points(config.spec)
+    there_m = movers.end_m[movers.moves]
     classes = points.class_id.flat[movers.points[movers.moves]]
     moved = replace(points, forward_m=there_m[:, 0], left_m=there_m[:, 1], class_id=classes)
-    add_points(counts, moved, SE2(0.0, 0.0, 0.0), config.spec)
-    return rasterise(counts, config.morphology)
+    return grid_of([(moved, SE2(0.0, 0.0, 0.0))], config)
 
 
 def _left(points: Points, ids: Ids, movers: Mover, yaw_rad: float, config: GridConfig) -> Cells:
     """Flag the cells (H, W) of an input's own grid that belong to somebody who moves."""
-    counts, spec = no_points(config.spec), config.spec
-    add_points(counts, points, SE2(0.0, 0.0, yaw_rad), spec)
-    grid = rasterise(counts, config.morphology)
+    spec = config.spec
+    grid = grid_of([(points, SE2(0.0, 0.0, yaw_rad))], config)
     cells = _cells(movers.start_m, spec)
     inside = ((cells >= 0) & (cells < grid.shape)).all(axis=1)
     cells, shown, moves = cells[inside], movers.points[inside], movers.moves[inside]

@@ -1,6 +1,7 @@
 """Discretisation D: labelled points to cells by priority, and class-wise morphology (readings 12 and 13)."""
 
 import math
+from collections.abc import Iterable
 
 import cv2
 import numba
@@ -9,8 +10,8 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import CLASS_COUNT, CLASSES, NO_POINT, UNKNOWN, Category, priorities
 from semgrid_eval.geometry import SE2
-from semgrid_eval.grids.spec import GridSpec, Morphology
-from semgrid_eval.sensors.sensor import Points
+from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.sensors.sensor import Morphology, Points
 
 Cells = NDArray[np.uint8]
 Counts = NDArray[np.int32]
@@ -48,21 +49,47 @@ def add_points(counts: Counts, points: Points, grid_from_points: SE2, spec: Grid
     )
 
 
+def grid_of(seen: Iterable[tuple[Points, SE2]], config: GridConfig) -> Cells:
+    """Make a grid (H, W) of what sensors of a configuration saw, each moved as `add_points` says.
+
+    Points of all are counted together. Morphology is each sensor's own: the cells of those that share one are filtered
+    together, and what is left of all is merged by the rule of `rasterise`.
+    """
+    parts: dict[Morphology, Counts] = {}
+    for points, grid_from_points in seen:
+        counts = parts.setdefault(config.morphology_of(points.sensor), no_points(config.spec))
+        add_points(counts, points, grid_from_points, config.spec)
+    if len(parts) == 1:
+        ((morphology, counts),) = parts.items()
+        return rasterise(counts, morphology)
+    total = sum(parts.values(), no_points(config.spec))
+    layers = np.zeros(total.shape, np.bool_)
+    for morphology, counts in parts.items():
+        layers |= _layers(counts, morphology)
+    merged: Cells = _strongest(total, layers, _PRIORITIES)
+    return merged
+
+
 def rasterise(counts: Counts, morphology: Morphology = "minkowski") -> Cells:
     """Decide the class of each cell: (C, H, W) point counts -> (H, W) class ids.
 
     The class of highest priority wins, then the one with more points, then the lower id. Morphology works on each
     class alone; its results are merged by the same rule.
     """
-    grid: Cells = _strongest(counts, counts > 0, _PRIORITIES)
+    grid: Cells = _strongest(counts, _layers(counts, morphology), _PRIORITIES)
+    return grid
+
+
+def _layers(counts: Counts, morphology: Morphology) -> NDArray[np.bool_]:
+    """Tell for each class which cells are its own, after morphology: (C, H, W) -> (C, H, W)."""
     if morphology == "off":
-        return grid
+        return np.asarray(counts > 0)
+    grid: Cells = _strongest(counts, counts > 0, _PRIORITIES)
     layers = np.zeros(counts.shape, np.bool_)
     for class_id in np.unique(grid):
         if class_id != UNKNOWN:
             layers[class_id] = _filter_class((grid == class_id).astype(np.uint8), int(class_id), morphology)
-    merged: Cells = _strongest(counts, layers, _PRIORITIES)
-    return merged
+    return layers
 
 
 def _filter_class(layer: Cells, class_id: int, morphology: Morphology) -> NDArray[np.bool_]:

@@ -1,6 +1,6 @@
 """What a grid is and how it is made: extent, sensors and the choices that the paper leaves (readings 12 to 22)."""
 
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,8 @@ from semgrid_eval.faults import meant, not_one_of
 from semgrid_eval.motion import Integrator
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sensors.kinds import Sensor, SensorName
-from semgrid_eval.sensors.sensor import SensorConfig
+from semgrid_eval.sensors.sensor import Morphology, SensorConfig
 
-Morphology = Literal["minkowski", "opencv", "off"]
 STANDING, MOVING = 1, 2  # bits of the flags that say whose footprint a cell lies in
 
 
@@ -64,7 +63,7 @@ class GridConfig(Config):
     # The sensors whose points, counted together, make the targets. The times of the first are the grids'.
     target: tuple[str, ...] = Field(("full",), min_length=1)
     integrator: Integrator = "euler"  # of the egomotion, as in the paper; `EgoMotion` has the other (reading 17)
-    morphology: Morphology = "minkowski"  # reading 12
+    morphology: Morphology = "minkowski"  # of sensors that have none of their own; the paper's (reading 12)
     stretch_frames: int = Field(30, ge=2, le=100_000)  # length of a recording; longer logs are cut (reading 18)
     # Grid class, or none, by Cityscapes label name; replaces single entries of the default (reading 21).
     class_map: dict[str, str | None] = Field(default_factory=dict)
@@ -101,6 +100,10 @@ class GridConfig(Config):
         """The part of a camera's image that leads the target; None where a sensor of another kind does."""
         first = self.sensors[self.target[0]]
         return first if isinstance(first, CameraSensor) else None
+
+    def morphology_of(self, sensor: str) -> Morphology:
+        """What is done to the cells of a sensor: its own choice, or the grid's."""
+        return self.sensors[sensor].morphology or self.morphology
 
     def target_identity(self) -> dict[str, object]:
         """Return what determines the targets alone, whatever other sensors there are and what any is called."""

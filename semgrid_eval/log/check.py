@@ -9,7 +9,7 @@ from semgrid_eval.log.container import damage_as_log_error
 from semgrid_eval.log.contract import Contract, TopicContract, topics_of
 from semgrid_eval.log.default_contract import default_contract
 from semgrid_eval.log.findings import Finding, LogReport, Severity, bounded, error
-from semgrid_eval.log.quantities import Extents, camera_extents, motion_extents
+from semgrid_eval.log.quantities import Extents, camera_extents, lidar_extents, motion_extents
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.stamps import stamp_of
 from semgrid_eval.log.timing import Timeline, Times, coverage, judged, latencies, timing
@@ -36,7 +36,7 @@ def check_log(path: Path, contract: Contract | None = None) -> LogReport:
         with LogReader(path) as log:
             log.verify()
             conditions = log.conditions()
-            log.attachments()
+            log.road_map()  # which reads all attachments
             timeline = _timeline(log, expected)
             for finding in _findings(log, expected, timeline):  # one by one: those before damage count as well
                 findings.append(finding)
@@ -74,6 +74,8 @@ def _findings(log: LogReader, contract: Contract, timeline: Timeline) -> Iterato
     if recovered := log.recovered():
         yield Finding(Severity.WARNING, "file", str(recovered))
     yield from judged(contract.cameras, "cameras", len(cameras), f"there are {len(cameras)}")
+    sensors = len(cameras) + len(log.lidars) + bool(timeline.get(topics.TRUE_ACTORS))
+    yield from judged(contract.sensors, "sensors", sensors, f"there are {sensors}")
     duration_s = _duration_s(timeline)
     yield from judged(contract.duration_s, "duration_s", duration_s, f"is {duration_s:g} s")
     for name, expected in contract.topics.items():
@@ -103,6 +105,8 @@ def _extents(log: LogReader, timeline: Timeline) -> Generator[Finding, None, Ext
             yield error(f"camera {camera}", f"cannot be looked at without proper messages of {', '.join(lacking)}")
         else:
             found |= yield from camera_extents(log, camera)
+    for lidar in log.lidars:
+        found |= lidar_extents(log, lidar)
     return found
 
 

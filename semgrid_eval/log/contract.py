@@ -90,6 +90,7 @@ class Contract(Config):
 
     checksums: Severity | None = None  # how bad it is if there are none
     cameras: Range | None = None  # how many there are
+    sensors: Range | None = None  # how many cameras and LiDARs there are; true actors count as one more
     duration_s: Range | None = None  # from the first message to the last
     largest_label_id: Range | None = None  # of all label images
     topics: dict[str, TopicContract] = Field(default_factory=dict)

@@ -52,7 +52,7 @@ def default_contract() -> Contract:
     ids = {"label_id": Range(low=0, high=_LAST_LABEL_ID)}
     return Contract(
         checksums=Severity.WARNING,
-        cameras=_NEEDED,
+        sensors=_NEEDED,
         largest_label_id=Range(low=_LAST_TRAIN_ID + 1),
         topics={
             topics.EGO_MOTION: _STEADY.model_copy(update=motion),

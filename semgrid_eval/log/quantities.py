@@ -11,7 +11,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.log import topics
 from semgrid_eval.log.findings import Finding, error
 from semgrid_eval.log.reader import LogReader
-from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.log.topics import camera_topic, lidar_of, lidar_topic
 from semgrid_eval.motion import MotionSample
 from semgrid_eval.recording.colour import read_size
 from semgrid_eval.recording.png import decode_gray
@@ -22,6 +22,7 @@ _CAMERA_TOPIC = re.compile(r"/camera/[^/]+/(.+)")
 _MOTION = ("speed_mps", "yaw_rate_radps", "latitude_deg", "longitude_deg", "heading_deg")
 _MOUNTING = ("baseline_m", "x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad")
 _OPTICS = ("fx_px / width", "fy_px / fx_px", "u0_px / width", "v0_px / height", "fx_px", "fy_px", "u0_px", "v0_px")
+_SWEEP = ("points", "range_m", "label_id")
 _OF_CHANNELS = {
     topics.CALIBRATION: _OPTICS,
     topics.STEREO: _MOUNTING,
@@ -34,10 +35,13 @@ def quantities_of(topic: str) -> tuple[str, ...]:
     """Name what the messages of a topic measure.
 
     `valid_share` is the part of a disparity image's pixels that have a disparity, `acceleration_mps2` the change of
-    the speed from one message to the next; the others are what messages say, or ratios of that.
+    the speed from one message to the next, `points` how many a sweep has; the others are what messages say, or ratios
+    of that.
     """
     if topic == topics.EGO_MOTION:
         return (*_MOTION, "acceleration_mps2")
+    if lidar_of(topic) is not None:
+        return _SWEEP
     found = _CAMERA_TOPIC.fullmatch(topic)
     return _OF_CHANNELS.get(found[1], ()) if found else ()
 
@@ -87,6 +91,22 @@ def camera_extents(log: LogReader, camera: str) -> Generator[Finding, None, Exte
         sizes = zip(("width_px", "height_px"), map(_one, size), strict=True)
         found[camera_topic(camera, topics.DISPARITY)].update(sizes)
     return found
+
+
+def lidar_extents(log: LogReader, lidar: str) -> Extents:
+    """Decode every sweep of a LiDAR and return what they measure.
+
+    Raises:
+        LogError: a sweep is damaged or impossible.
+    """
+    found: dict[str, Extent] = {}
+    for sweep in log.sweeps(lidar):
+        _widen(found, "points", _one(len(sweep.points_m)))
+        range_m = np.sqrt(np.square(sweep.points_m, dtype=np.float64).sum(axis=1))
+        for name, values in (("range_m", range_m), ("label_id", sweep.label_id)):
+            if values is not None and len(values):
+                _widen(found, name, Extent(float(values.min()), float(values.max())))
+    return {lidar_topic(lidar): found}
 
 
 def _frame_values(frame: CameraFrame) -> Iterator[tuple[str, str, Extent]]:

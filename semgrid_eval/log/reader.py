@@ -11,7 +11,11 @@ from semgrid_eval.log import codec, recovered, topics
 from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene
 from semgrid_eval.log.container import Container, damage_as_log_error
 from semgrid_eval.log.recovered import Recovered
-from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.log.sweeps import read_sweep
+from semgrid_eval.log.topics import camera_topic, lidar_topic
+from semgrid_eval.recording import road_map
+from semgrid_eval.recording.lidar import LidarSweep
+from semgrid_eval.recording.road_map import RoadMap
 from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Quantity
 
 T = TypeVar("T")
@@ -59,6 +63,12 @@ class LogReader(Container):
             raise
 
     @property
+    def lidars(self) -> tuple[str, ...]:
+        """Names of the LiDARs whose sweeps the log holds, sorted."""
+        found = (topics.lidar_of(channel.topic) for channel in self.summary.channels.values())
+        return tuple(sorted({name for name in found if name is not None}))
+
+    @property
     def start_ns(self) -> int:
         """When the log begins: the time of its first message, 0 where it has none."""
         return min((index.message_start_time for index in self.summary.chunk_indexes), default=0)
@@ -80,12 +90,15 @@ class LogReader(Container):
         Raises:
             LogError: there is no such camera, or there are several and none is wanted.
         """
-        cameras = self.scene.cameras
-        chosen = cameras[0] if wanted is None and len(cameras) == 1 else wanted
-        if chosen not in cameras:
-            known = ", ".join(cameras)
-            raise LogError(f"{wanted or '(not given)'} is not one of: {known}", path=self.path, field="camera")
-        return chosen
+        return self._choose(wanted, self.scene.cameras, "camera")
+
+    def choose_lidar(self, wanted: str | None) -> str:
+        """Return the LiDAR that is wanted, or the log's only one where none is.
+
+        Raises:
+            LogError: there is no such LiDAR, or there are several and none is wanted.
+        """
+        return self._choose(wanted, self.lidars, "lidar")
 
     def schemas(self) -> dict[str, str]:
         """Return the name of the message type by topic."""
@@ -126,9 +139,21 @@ class LogReader(Container):
         """Return the true poses in the order of time; none where the truth is not known."""
         return list(self._values(topics.TRUE_POSE, codec.read_pose))
 
+    def sweeps(self, lidar: str) -> Iterator[LidarSweep]:
+        """Iterate over the sweeps of a LiDAR in the order of time."""
+        return self._values(lidar_topic(self.choose_lidar(lidar)), read_sweep)
+
     def actors(self) -> Iterator[tuple[int, tuple[Actor, ...]]]:
         """Iterate over time stamps (ns) and the true boxes of all actors; nothing where the truth is not known."""
         return self._values(topics.TRUE_ACTORS, codec.read_actors)
+
+    def road_map(self) -> RoadMap | None:
+        """Return the map around the drive; None where the log has none."""
+        data = self.attachments().get(road_map.FILE)
+        if data is None:
+            return None
+        with damage_as_log_error(self.path):
+            return RoadMap.from_json(data)
 
     def moments(self) -> Iterator[Moment]:
         """Iterate over all that the log holds, in the order of time.
@@ -136,7 +161,8 @@ class LogReader(Container):
         A moment is all that has one stamp; motion belongs to the moment that comes next.
         """
         shown = picture_topics(self.scene.cameras, topics.PICTURE_FIELDS)
-        decoders = {**_DECODERS, **dict.fromkeys(shown, codec.read_image)}
+        swept = {lidar_topic(lidar): lidar for lidar in self.lidars}
+        decoders = {**_DECODERS, **dict.fromkeys(shown, codec.read_image), **dict.fromkeys(swept, read_sweep)}
         waiting: list[MotionSample] = []
         messages = _apart_from_motion(self._decoded(decoders), waiting)
         for stamp_ns, of_one_time in groupby(messages, key=lambda message: message.stamp_ns):
@@ -145,7 +171,8 @@ class LogReader(Container):
             found = {topic: value for topic, _, value in of_one_time}
             pictures = [Picture(stamp_ns, *shown[topic], value) for topic, value in found.items() if topic in shown]
             _, actors = found.get(topics.TRUE_ACTORS, (stamp_ns, None))
-            yield Moment(stamp_ns, dict(camera_frames(pictures)), motion, found.get(topics.TRUE_POSE), actors)
+            sweeps = {swept[topic]: value for topic, value in found.items() if topic in swept}
+            yield Moment(stamp_ns, dict(camera_frames(pictures)), motion, found.get(topics.TRUE_POSE), actors, sweeps)
 
     def pictures(self, cameras: Iterable[str], channels: Iterable[str]) -> Iterator[Picture]:
         """Iterate over the pictures of some channels of some cameras in the order of time."""
@@ -166,12 +193,25 @@ class LogReader(Container):
     def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
         """Iterate over what messages say; `decoders` maps topics to what reads their messages."""
         for topic, stamp_ns, data, _ in self.messages(decoders):
-            with damage_as_log_error(self.path, f"{topic} at {stamp_ns} ns"):
-                value = decoders[topic](data)
+            place = f"{topic} at {stamp_ns} ns"
+            try:
+                with damage_as_log_error(self.path, place):
+                    value = decoders[topic](data)
+            except LogError:
+                raise
+            except InputError as error:
+                raise LogError(str(error), path=self.path, field=place) from error
             yield Decoded(topic, stamp_ns, value)
 
     def _values(self, topic: str, decode: Callable[[bytes], T]) -> Iterator[T]:
         return (decoded.value for decoded in self._decoded({topic: decode}))
+
+    def _choose(self, wanted: str | None, there: tuple[str, ...], what: str) -> str:
+        chosen = there[0] if wanted is None and len(there) == 1 else wanted
+        if chosen not in there:
+            known = ", ".join(there) or "none"
+            raise LogError(f"{wanted or '(not given)'} is not one of: {known}", path=self.path, field=what)
+        return chosen
 
     def _first(self, topic: str) -> bytes:
         entry = next(self.messages([topic]), None)

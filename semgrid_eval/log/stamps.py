@@ -3,6 +3,7 @@
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 
 from semgrid_eval.log.codec import stamp_ns
@@ -12,7 +13,7 @@ from semgrid_eval.log.schemas.stereo_calibration_pb2 import StereoCalibration
 
 _STAMPED = {
     each.DESCRIPTOR.full_name: each
-    for each in (CameraCalibration, CompressedImage, PoseInFrame, Actors, Egomotion, StereoCalibration)
+    for each in (CameraCalibration, CompressedImage, PointCloud, PoseInFrame, Actors, Egomotion, StereoCalibration)
 }
 
 

@@ -1,6 +1,7 @@
 """Names of the topics and coordinate frames in a log, and what the channels of pictures say of their coding."""
 
 import json
+import re
 
 from semgrid_eval.classes import CITYSCAPES_LABELS
 
@@ -45,6 +46,12 @@ PICTURES: dict[str, tuple[str, dict[str, str]]] = {
 
 The colour image, which scoring never reads, comes last and has a chunk of its own.
 """
+SWEEP_NOTES = {
+    "frame": "points are in the LiDAR's own frame; the pose of a message takes them to base_link",
+    "label": _LABEL_NOTES["coding"],
+    "names": _LABEL_NOTES["names"],
+}
+"""Metadata of the channel of a LiDAR; its fields are in `log.sweeps`."""
 PICTURE_FIELDS = {channel: field for field, (channel, _) in PICTURES.items()}
 """Field of `CameraFrame` by channel of a camera."""
 
@@ -52,6 +59,17 @@ PICTURE_FIELDS = {channel: field for field, (channel, _) in PICTURES.items()}
 def camera_topic(camera: str, channel: str) -> str:
     """Return the topic of one channel of a camera; viewers pair channels by what stands before the last slash."""
     return f"/camera/{camera}/{channel}"
+
+
+def lidar_topic(lidar: str) -> str:
+    """Return the topic of a LiDAR's sweeps."""
+    return f"/lidar/{lidar}/points"
+
+
+def lidar_of(topic: str) -> str | None:
+    """Return the name of the LiDAR whose sweeps a topic holds; None where it holds none."""
+    found = re.fullmatch(r"/lidar/([^/]+)/points", topic)
+    return found[1] if found else None
 
 
 def optical_frame(camera: str) -> str:

@@ -13,9 +13,11 @@ from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.container import MAX_STAMP_NS
-from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.log.sweeps import sweep_message
+from semgrid_eval.log.topics import camera_topic, lidar_topic
 from semgrid_eval.motion import EgoMotion, implausible
 from semgrid_eval.recording.colour import ImageSize, read_size, require_whole
+from semgrid_eval.recording.lidar import LidarSweep
 from semgrid_eval.recording.png import read_header, require_pixels, with_palette
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
 
@@ -137,6 +139,8 @@ class MomentWriter:
             self._vehicle(moment)
             for camera in sorted(moment.cameras):
                 self._camera(camera, moment.cameras[camera])
+            for lidar in sorted(moment.sweeps):
+                self._sweep(lidar, moment.sweeps[lidar])
             count += 1
         if not count:
             raise InputError("holds no frame", field=self._recording.name)
@@ -187,6 +191,13 @@ class MomentWriter:
                 self._writer.end_chunk()
             message = codec.image_message(frame.stamp_ns, camera, png)
             self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes)
+        self._writer.end_chunk()
+
+    def _sweep(self, lidar: str, sweep: LidarSweep) -> None:
+        message = sweep_message(sweep)
+        self._writer.end_chunk()
+        topic = lidar_topic(lidar)
+        self._writer.write(topic, message, log_ns=sweep.stamp_ns, notes=topics.SWEEP_NOTES)
         self._writer.end_chunk()
 
     def _whole(self, camera: str, channel: str, png: bytes, stamp_ns: int) -> ImageSize:

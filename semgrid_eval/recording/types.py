@@ -1,7 +1,7 @@
 """What every source yields and every log holds: calibrated camera frames, motion samples and, truth where known."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from typing import NamedTuple
 
@@ -9,6 +9,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
 from semgrid_eval.motion import MotionSample as MotionSample
 from semgrid_eval.motion import Pose as Pose
+from semgrid_eval.recording.lidar import LidarSweep
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Actor:
     """The true box of another road user in the map frame of `Pose`; x, y is the centre of its footprint."""
 
     actor_id: int  # equals the instance value of its pixels
-    label_id: int  # Cityscapes label id
+    label_id: int  # Cityscapes label id; `unlabeled` where sensors saw nothing of it at that time
     x_m: float
     y_m: float
     yaw_rad: float
@@ -87,13 +88,14 @@ class CameraFrame:
 
 @dataclass(frozen=True)
 class Moment:
-    """Everything a source knows of one time stamp: a frame for each camera that has one, motion and truth."""
+    """Everything a source knows of one time stamp: frames and sweeps of what saw something then, motion and truth."""
 
     stamp_ns: int
     cameras: dict[str, CameraFrame]
     motion: tuple[MotionSample, ...] = ()  # samples since the last moment
     pose: Pose | None = None
     actors: tuple[Actor, ...] | None = None
+    sweeps: Mapping[str, LidarSweep] = field(default_factory=dict)  # by LiDAR
 
 
 class Quantity(NamedTuple):

@@ -10,12 +10,18 @@ from pydantic import BeforeValidator, SerializeAsAny, StringConstraints
 
 from semgrid_eval.config import of_kind
 from semgrid_eval.sensors.camera import CameraSensor, read_cameras
+from semgrid_eval.sensors.lidar import LidarSensor, read_lidars
 from semgrid_eval.sensors.sensor import Kind, Points, SensorConfig
+from semgrid_eval.sensors.tracks import TracksSensor, read_tracks
 
 if TYPE_CHECKING:
     from semgrid_eval.log.reader import LogReader
 
-KINDS: dict[str, Kind] = {"camera": Kind(CameraSensor, read_cameras)}
+KINDS: dict[str, Kind] = {
+    "camera": Kind(CameraSensor, read_cameras),
+    "lidar": Kind(LidarSensor, read_lidars),
+    "tracks": Kind(TracksSensor, read_tracks),
+}
 _DEFAULT_KIND = "camera"
 TOLERANCE_NS = 1_000_000
 """Cameras that are triggered together do not stamp alike: what is this much later is taken for simultaneous."""

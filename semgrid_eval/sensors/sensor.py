@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,16 @@ if TYPE_CHECKING:  # whoever reads settings alone needs no reader of logs
     from semgrid_eval.log.reader import LogReader
 
 
+Morphology = Literal["minkowski", "opencv", "off"]
+
+
 class SensorConfig(Config):
     """Settings that sensors of all kinds have."""
 
     kind: str  # one of `semgrid_eval.sensors.kinds.KINDS`
+    # What is done to its cells, of each class alone (reading 12). None takes the grid's, and is not written, so that
+    # grids of cameras keep their digests.
+    morphology: Morphology | None = Field(None, exclude_if=lambda value: value is None)
     max_age_s: float = Field(0.2, ge=0.0, le=10.0)  # what is older at the time of a grid is left out
 
 

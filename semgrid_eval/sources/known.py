@@ -42,6 +42,8 @@ class Known(NamedTuple):
 SOURCES = {
     "cityscapes": Known("semgrid_eval.sources.cityscapes.source:SOURCE", "Sequence trees in Cityscapes' layout."),
     "synthetic": Known("semgrid_eval.sources.town.source:SYNTHETIC", "Drives through a simulated town."),
+    "argoverse2": Known("semgrid_eval.sources.argoverse2.source:SOURCE", "Argoverse 2's Sensor data: tracks and maps."),
+    "kitti": Known("semgrid_eval.sources.kitti.source:SOURCE", "KITTI's and SemanticKITTI's sequences."),
     "ros2": Known("semgrid_eval.sources.ros2.source:SOURCE", "ROS 2 bags, by a map of their topics."),
     "town-v1": Known("semgrid_eval.sources.town.source:TOWN_V1", "A frozen data set of the simulated town."),
 }

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,10 +10,10 @@ from support.cameras import calibration
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, CLASSES, NO_POINT
 from semgrid_eval.geometry import SE2
-from semgrid_eval.grids.rasterise import STATIC_KERNELS_CELLS, add_points, no_points, rasterise
-from semgrid_eval.grids.spec import GridSpec
+from semgrid_eval.grids.rasterise import STATIC_KERNELS_CELLS, add_points, grid_of, no_points, rasterise
+from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.sensors.projection import Projection
-from semgrid_eval.sensors.sensor import Points
+from semgrid_eval.sensors.sensor import Points, SensorConfig
 
 ROAD, SIDEWALK, POLE, CAR, PERSON = (CLASS_NAMES.index(n) for n in ("road", "sidewalk", "pole_sign", "car", "person"))
 SMALL = GridSpec(rows=16, columns=16, cell_m=2.0, agent_row=16, agent_column=8)
@@ -202,3 +203,50 @@ def pixel_of(camera, forward_m, left_m, up_m):
     u = round(camera.u0_px - camera.fx_px * y / x)
     v = round(camera.v0_px - camera.fy_px * z / x)
     return u, v, round(camera.fx_px * camera.baseline_m / x * 256 + 1)
+
+
+class Anything(SensorConfig):
+    """A sensor with settings that all have."""
+
+    kind: str = "any"
+
+
+def grid_with(morphologies, *seen):
+    """Make a grid of what sensors `a`, `b`, ... saw, each with a morphology of its own, in a grid that has `opencv`."""
+    sensors = {name: Anything(morphology=each) for name, each in zip("ab", morphologies, strict=False)}
+    spec = GridSpec(rows=16, columns=16, cell_m=1.0, agent_row=16, agent_column=8)
+    config = GridConfig.model_construct(spec=spec, sensors=sensors, morphology="opencv")
+    named = [replace(points, sensor=name) for points, name in zip(seen, "ab", strict=False)]
+    return grid_of([(points, SE2(0.0, 0.0, 0.0)) for points in named], config)
+
+
+def line(left_m, class_id):
+    """A line of one cell along the street."""
+    ahead_m = np.arange(0.5, 16.0)
+    return points_of(ahead_m, np.full(len(ahead_m), left_m), np.full(len(ahead_m), class_id))
+
+
+def test_cells_are_filtered_as_their_own_sensor_asks():
+    thin, block = line(-3.5, ROAD), points_of(*np.mgrid[0.5:16.0, 0.5:8.0].reshape(2, -1), np.full(16 * 8, SIDEWALK))
+    kept = grid_with(["off", "minkowski"], thin, block)
+    assert (kept[:, 11] == ROAD).all()
+    assert (kept[4:12, 2:6] == SIDEWALK).all()
+    lost = grid_with(["minkowski", "minkowski"], thin, block)
+    assert not (lost == ROAD).any()
+    np.testing.assert_array_equal(kept == SIDEWALK, lost == SIDEWALK)
+
+
+def test_sensors_of_one_morphology_are_filtered_together_and_none_takes_the_grids():
+    left, right = (
+        points_of(*np.mgrid[0.5:16.0, low:high].reshape(2, -1), np.full(32, ROAD))
+        for low, high in ((0.5, 2.0), (2.5, 4.0))
+    )
+    for name in ("minkowski", "opencv"):
+        assert (grid_with([name, name], left, right)[6:10, 5:7] == ROAD).all(), "four cells wide together"
+        assert not (grid_with([name], left) == ROAD).any(), "two cells wide alone"
+    np.testing.assert_array_equal(grid_with([None, "opencv"], left, right), grid_with(["opencv"] * 2, left, right))
+
+
+def test_of_two_sensors_the_class_with_more_points_of_both_wins():
+    twice, once = points_of([0.5, 0.5], [0.5, 0.5], [ROAD, SIDEWALK]), points_of([0.5], [0.5], [SIDEWALK])
+    assert grid_with(["off", "minkowski"], twice, once)[15, 7] == SIDEWALK

@@ -104,8 +104,8 @@ def test_a_point_at_a_cells_centre_is_drawn_in_that_cell(spec):
             {"sensors": {"full": {"top": 30}}},
             "sensors.full: top: unknown key; allowed here: bottom_px, camera, .*top_px",
         ),
-        ({"sensors": {"full": {"kind": "sonar"}}}, "sensors.full: kind: 'sonar' is not camera, the only choice"),
-        ({"sensors": {"full": {"kind": ["camera"]}}}, "sensors.full: kind: .* is not camera, the only choice"),
+        ({"sensors": {"full": {"kind": "sonar"}}}, "sensors.full: kind: 'sonar' is not one of camera, lidar, tracks"),
+        ({"sensors": {"full": {"kind": ["camera"]}}}, "sensors.full: kind: .* is not one of camera, lidar, tracks"),
         ({"sensors": {"full": {"bottom_px": "3"}}}, "sensors.full.bottom_px: .*not '3'"),
         ({"sensors": {"full": {"exclude_border_px": -1}}}, "sensors.full.exclude_border_px: .*not -1"),
         ({"sensors": {"full": {"exclude_border_px": 1.5}}}, "sensors.full.exclude_border_px: .*not 1.5"),
@@ -121,3 +121,12 @@ def test_a_point_at_a_cells_centre_is_drawn_in_that_cell(spec):
 def test_impossible_configurations_name_the_place(value, place):
     with pytest.raises(ConfigError, match="grids.yaml: .*" + place):
         parse_config(GridConfig, value, path="grids.yaml")
+
+
+def test_a_morphology_of_a_sensors_own_is_written_only_where_there_is_one():
+    own = GridConfig(sensors={"full": CameraSensor(morphology="off"), "plain": CameraSensor()})
+    assert (own.morphology_of("full"), own.morphology_of("plain")) == ("off", "minkowski")
+    written = own.model_dump(mode="json")["sensors"]
+    assert written["full"]["morphology"] == "off"
+    assert "morphology" not in written["plain"]
+    assert grid_digest(own) != grid_digest(GridConfig(sensors={"full": CameraSensor(), "plain": CameraSensor()}))

@@ -1,8 +1,4 @@
-"""The motion of the vehicle from odometry, twists and inertial sensors, as samples of speed and yaw rate.
-
-Poses are differentiated as the integrator of logs puts them together again (`EgoMotion`, euler): the speed of a sample
-is that of the step that begins at it, its yaw rate that of the step that ends at it.
-"""
+"""The motion of the vehicle from odometry, twists and inertial sensors, as samples of speed and yaw rate."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,11 +8,11 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.recording.types import MotionSample
+from semgrid_eval.sources.poses import speeds_mps, yaw_rates_radps
 from semgrid_eval.sources.ros2.kinds import IMU, ODOMETRY
 from semgrid_eval.sources.ros2.mapping import MotionMap
 from semgrid_eval.sources.ros2.transforms import rotation_of
 
-_NS_PER_S = 1e9
 Floats = NDArray[np.float64]
 
 
@@ -91,10 +87,7 @@ def _speed(by: str, track: Track) -> tuple[NDArray[np.int64], Floats]:
     stamps_ns, values = _enough(track)
     if by == "twist":
         return stamps_ns, values[:, 0]
-    x_m, y_m = np.diff(values[:, 0]), np.diff(values[:, 1])
-    ahead_m = x_m * np.cos(values[:-1, 2]) + y_m * np.sin(values[:-1, 2])
-    speeds = np.copysign(np.hypot(x_m, y_m), ahead_m) / _steps_s(stamps_ns)
-    return stamps_ns, np.append(speeds, speeds[-1])
+    return stamps_ns, speeds_mps(stamps_ns, values)
 
 
 def _yaw_rate(by: str, track: Track, imu_turn: Floats | None) -> tuple[NDArray[np.int64], Floats]:
@@ -103,8 +96,7 @@ def _yaw_rate(by: str, track: Track, imu_turn: Floats | None) -> tuple[NDArray[n
         return stamps_ns, values @ imu_turn
     if by == "twist":
         return stamps_ns, values[:, 1]
-    rates = np.diff(np.unwrap(values[:, 2])) / _steps_s(stamps_ns)
-    return stamps_ns, np.insert(rates, 0, rates[0])
+    return stamps_ns, yaw_rates_radps(stamps_ns, values[:, 2])
 
 
 def _enough(track: Track) -> tuple[NDArray[np.int64], Floats]:
@@ -120,11 +112,6 @@ def _checked(rates: Rates, topic: str) -> Rates:
         if len(wrong := np.flatnonzero(~np.isfinite(values))):
             raise InputError(f"{values[wrong[0]]} at {rates.stamps_ns[wrong[0]]} ns is not finite", field=topic)
     return rates
-
-
-def _steps_s(stamps_ns: NDArray[np.int64]) -> Floats:
-    """Return the steps between stamps, (N,) -> (N - 1,), in seconds."""
-    return np.asarray(np.diff(stamps_ns) / _NS_PER_S, np.float64)
 
 
 def _interpolated(at_ns: NDArray[np.int64], stamps_ns: NDArray[np.int64], values: Floats) -> Floats:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from semgrid_eval import geometry
 from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
 from semgrid_eval.sources.ros2.mapping import Extrinsics
@@ -99,17 +100,10 @@ def rotation_of(quaternion: Any) -> np.ndarray[Any, np.dtype[np.float64]]:  # no
         InputError: it is zero or not finite.
     """
     x, y, z, w = (float(getattr(quaternion, name)) for name in "xyzw")
-    norm = x * x + y * y + z * z + w * w
-    if not (np.isfinite(norm) and norm > 0):
-        raise InputError(f"({x:g}, {y:g}, {z:g}, {w:g}) is not a rotation", field="quaternion")
-    s = 2.0 / norm
-    return np.array(
-        [
-            [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-            [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
-            [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
-        ]
-    )
+    try:
+        return geometry.rotation_of((x, y, z, w))
+    except ValueError as error:
+        raise InputError(str(error), field="quaternion") from error
 
 
 def _se3(transform: Any) -> SE3:  # noqa: ANN401

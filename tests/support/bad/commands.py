@@ -40,7 +40,7 @@ run baselines --logs logs --out out --memory-limit 0
 run baselines --logs logs --out out --gpus -1
 run baselines --logs logs --out out --dry-runn
 run baselines more --logs logs --out out
-convert kitti SRC out
+convert waymo SRC out
 convert cityscapse SRC out
 convert cityscapes nowhere out
 convert cityscapes empty

@@ -138,7 +138,7 @@ model: newest, grid: {class_map: {car: 3}}
 model: newest, grid: {class_map: [car]}
 model: newest, grid: {sensors: [full]}
 model: newest, grid: {sensors: {full: whole}}
-model: newest, grid: {sensors: {full: {kind: lidar}}}
+model: newest, grid: {sensors: {full: {kind: radar}}}
 model: newest, grid: {sensors: {full: {top: 3}}}
 model: newest, grid: {sensors: {full: {top_px: -1}}}
 model: newest, grid: {sensors: {full: {top_px: 256}}}

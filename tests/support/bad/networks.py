@@ -22,7 +22,7 @@ IMAGE = (1, 3, "h", "w")
 def whole() -> None:
     """Write a log with a colour image in each frame, and a network of 19 classes."""
     picture = cv2.imencode(".png", np.zeros((16, 32, 3), np.uint8))[1].tobytes()
-    _write(lambda frame: replace(frame, image_png=picture))
+    _write(lambda frame: replace(frame, image_file=picture))
     colour_network(Path("net.onnx"), colours=COLOURS)
 
 
@@ -145,7 +145,7 @@ KIND = Kind(
         _given("--mean that is not finite", "--mean nan 0 0"),
         _given("--size 0", "--size 0 4"),
         _given("--out in the folder of the logs", "--out logs/new"),
-        Bad("a log without colour images", SEGMENT, spoil=lambda: _write(lambda frame: replace(frame, image_png=None))),
+        Bad("a log without colour images", SEGMENT, spoil=lambda: _write(lambda frame: replace(frame, image_file=None))),
         Bad(
             "two logs of one name",
             "segment logs more --model net.onnx --out out",

@@ -1,0 +1,1 @@
+"""Logs of the Argoverse 2 Sensor data set."""

@@ -1,0 +1,43 @@
+"""`convert argoverse2`: the Argoverse 2 Sensor data set as logs.
+
+SRC/<split>/<log>/annotations.feather              boxes in the vehicle frame, with the points inside of each
+SRC/<split>/<log>/city_SE3_egovehicle.feather      poses, among them one for each time of boxes
+SRC/<split>/<log>/map/log_map_archive_*.json       drivable areas and crossings in the city frame
+SRC/<split>/<log>/sensors/lidar/<time>.feather     sweeps in the vehicle frame, where present
+"""
+
+from pathlib import Path
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
+from semgrid_eval.sources.argoverse2.drive import Drive
+from semgrid_eval.sources.argoverse2.source import ArgoverseOptions
+
+SPLITS = ("train", "val", "test")
+
+
+def convert_argoverse(options: ArgoverseOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
+    """Write the logs of a data set; those that are up to date stay as they are.
+
+    Raises:
+        InputError: there is no such split, no log in it, or the disk is full.
+    """
+    jobs = [ConversionJob(each.name, each.split, each.digest, each.recording) for each in _drives(options)]
+    return convert_jobs(jobs, out, work)
+
+
+def _drives(options: ArgoverseOptions) -> list[Drive]:
+    there = [split for split in SPLITS if (options.src / split).is_dir()]
+    for split in options.split:
+        if split not in there:
+            raise InputError(f"{split} is not one of: {', '.join(there) or 'none'}", path=options.src, field="split")
+    chosen = [split for split in there if split in options.split or not options.split]
+    found = [
+        Drive(folder, split)
+        for split in chosen
+        for folder in sorted((options.src / split).iterdir())
+        if folder.is_dir() and not folder.name.startswith(".")
+    ]
+    if not found:
+        raise InputError(f"holds no log in a folder {', '.join(chosen or SPLITS)}", path=options.src)
+    return found

@@ -1,0 +1,35 @@
+"""Argoverse 2 as the command line offers it; light to import."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from semgrid_eval.config import Config
+from semgrid_eval.sources.known import Source, later
+
+_HELP = """Convert logs of the Argoverse 2 Sensor data set to OUT/<split>/<log>.mcap.
+
+SRC/<split>/<log> holds annotations.feather, city_SE3_egovehicle.feather and the map archive; sweeps of the LiDAR are
+taken along where there are some. A log has boxes of actors, drivable areas and crossings, and speed and yaw rate from
+the poses, at the times of boxes. Grids are made of them by sensors of kind `tracks` (docs/lidar.md). Images are left
+out: they come without labels and without a pair of their own.
+
+A log fails as a whole, in one line, if a file is missing or broken, a box is not finite, a category unknown or a pose
+missing. The others are converted; the exit code is then 1. Logs whose inputs have not changed are left as they are.
+"""
+
+
+class ArgoverseOptions(Config):
+    """Which logs."""
+
+    src: Path
+    split: Annotated[tuple[str, ...], Field(description="Only this split; may be given several times.")] = ()
+
+
+SOURCE = Source(
+    options=ArgoverseOptions,
+    convert=later("semgrid_eval.sources.argoverse2.convert:convert_argoverse", extra="argoverse"),
+    help=_HELP,
+    example="semgrid-eval convert argoverse2 sensor logs --split val",
+)

@@ -1,0 +1,1 @@
+"""Sequences in the layout of KITTI's odometry benchmark and of SemanticKITTI."""

@@ -1,0 +1,110 @@
+"""`convert kitti`: sequences in KITTI's or SemanticKITTI's layout as logs.
+
+SRC/sequences/<NN>/calib.txt            projections P2, P3 and the scanner's place, Tr
+SRC/sequences/<NN>/times.txt            seconds, a line for each frame
+SRC/sequences/<NN>/poses.txt            of camera 0, or SRC/poses/<NN>.txt
+SRC/sequences/<NN>/velodyne/000000.bin  x, y, z, reflectance, float32
+SRC/sequences/<NN>/labels/000000.label  SemanticKITTI's, where present
+SRC/sequences/<NN>/image_2, image_3     rectified colour images, where both are present
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import NoReturn
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
+from semgrid_eval.sources.kitti.sequence import KittiSequence, Part, camera0_at
+from semgrid_eval.sources.kitti.source import KittiOptions
+
+_LEAST_FRAMES = 2
+_NUMBER = re.compile(r"[0-9]{6}")
+
+
+def convert_kitti(options: KittiOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
+    """Write the logs of sequences; those that are up to date stay as they are.
+
+    Raises:
+        InputError: there is no such sequence, or the disk is full.
+    """
+    sequences, jobs = [], []
+    for folder in _folders(options):
+        try:
+            sequence = _sequence(folder, options)
+            parts = list(_parts(sequence, options))
+        except InputError as error:
+            refuse = partial(_refuse, str(error))
+            jobs.append(ConversionJob(folder.name, options.split, refuse, refuse))
+            continue
+        sequences.append(sequence)
+        jobs += [ConversionJob(each.name, each.split, each.digest, each.recording) for each in parts]
+    summary = convert_jobs(jobs, out, work)
+    summary.remark = _remark(sequences)
+    return summary
+
+
+def _refuse(fault: str) -> NoReturn:
+    raise InputError(fault)
+
+
+def _folders(options: KittiOptions) -> list[Path]:
+    folder = options.src / "sequences"
+    there = sorted(path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
+    if not there:
+        raise InputError("holds no folder of a sequence" if folder.is_dir() else "is not a folder", path=folder)
+    for name in options.sequence:
+        if name not in {path.name for path in there}:
+            known = ", ".join(path.name for path in there)
+            raise InputError(f"{name} is not one of: {known}", path=folder, field="sequence")
+    return [path for path in there if path.name in options.sequence or not options.sequence]
+
+
+def _sequence(folder: Path, options: KittiOptions) -> KittiSequence:
+    """See what a sequence has, without reading any file."""
+    scans, left, right = (_numbers(folder, channel) for channel in ("velodyne", "image_2", "image_3"))
+    channels = [name for name in ("velodyne", "labels") if scans and (folder / name).is_dir()]
+    if left and right:
+        channels += ["image_2", "image_3"]
+    numbers = scans or (left if right else [])
+    if not numbers:
+        raise InputError("holds neither scans nor pairs of images", path=folder)
+    own = folder / "poses.txt"
+    other = options.src / "poses" / f"{folder.name}.txt"
+    poses = other if other.is_file() and not own.is_file() else own
+    return KittiSequence(folder, poses, tuple(numbers), tuple(channels), camera0_at(options.camera_at_m))
+
+
+def _numbers(folder: Path, channel: str) -> list[int]:
+    found = (folder / channel).glob("*.bin" if channel == "velodyne" else "*.png")
+    return sorted(int(path.stem) for path in found if _NUMBER.fullmatch(path.stem))
+
+
+def _parts(sequence: KittiSequence, options: KittiOptions) -> Iterator[Part]:
+    """Cut a sequence into equal parts; a frame that is missing in between fails the part that it belongs to."""
+    first, end = sequence.numbers[0], sequence.numbers[-1] + 1
+    if end - first < _LEAST_FRAMES:
+        raise InputError("has a single frame; motion needs more", path=sequence.folder)
+    span_ns = sequence.stamps_ns[end - 1] - sequence.stamps_ns[first]
+    most = (end - first) // _LEAST_FRAMES
+    count = min(most, max(1, math.ceil(span_ns / (options.recording_s * 1e9)))) if options.recording_s else 1
+    bounds = [first + (end - first) * part // count for part in range(count + 1)]
+    for start, stop in pairwise(bounds):
+        yield Part(sequence, start, stop, options.split)
+
+
+def _remark(sequences: list[KittiSequence]) -> str:
+    """Say in one line what is not there."""
+    unlabelled = [
+        each.folder.name for each in sequences if "velodyne" in each.channels and "labels" not in each.channels
+    ]
+    blind = [each.folder.name for each in sequences if "image_2" not in each.channels]
+    parts = []
+    if unlabelled:
+        parts.append(f"scans without labels, of which no grid can be made: {', '.join(unlabelled)}")
+    if blind:
+        parts.append(f"no pairs of images, so no camera: {', '.join(blind)}")
+    return "; ".join(parts)

@@ -1,0 +1,62 @@
+"""The colour camera of KITTI: calibration of the left image, and disparity by matching it with the right one."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.geometry import SE3
+from semgrid_eval.recording.colour import decode_colour
+from semgrid_eval.recording.disparity import coded_disparity
+from semgrid_eval.recording.png import encode_gray
+from semgrid_eval.recording.types import CameraCalibration, CameraFrame
+from semgrid_eval.sources.kitti.files import Calibration, read_file
+from semgrid_eval.sources.matching import SemiGlobalMatching
+
+
+def calibration_of(given: Calibration, ego_from_camera0: SE3, path: Path) -> CameraCalibration:
+    """Return the left colour camera's; all cameras of KITTI are rectified to the axes of camera 0.
+
+    Raises:
+        InputError: a value is impossible, in the file `path`.
+    """
+    projection = given.left
+    fx_px, fy_px, u0_px, v0_px = (float(projection[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    try:
+        camera_m = np.linalg.solve(projection[:, :3], -projection[:, 3])  # of its place in the axes of camera 0
+        right_m = np.linalg.solve(given.right[:, :3], -given.right[:, 3])
+    except np.linalg.LinAlgError as error:
+        raise InputError("is not a projection", path=path, field="P2, P3") from error
+    x_m, y_m, z_m = ego_from_camera0.apply(np.asarray(camera_m, np.float64)).tolist()
+    baseline_m = float(right_m[0] - camera_m[0])
+    try:
+        return CameraCalibration(fx_px, fy_px, u0_px, v0_px, baseline_m, x_m, y_m, z_m, 0.0, 0.0, 0.0)
+    except InputError as error:
+        raise InputError(str(error), path=path) from error
+
+
+class StereoPairs:
+    """Makes frames of the pairs of images, PNG files whose bytes the log keeps."""
+
+    def __init__(self, calibration: CameraCalibration) -> None:
+        self._matching = SemiGlobalMatching(calibration)
+
+    def frame(self, stamp_ns: int, left: Path, right: Path) -> CameraFrame:
+        """Read and match the pair of a time.
+
+        Raises:
+            InputError: an image is missing or damaged, or their sizes differ.
+        """
+        files = [read_file(path) for path in (left, right)]
+        grey = [_grey(data, path) for data, path in zip(files, (left, right), strict=True)]
+        if grey[0].shape != grey[1].shape:
+            sizes = [f"{each.shape[1]} x {each.shape[0]}" for each in grey]
+            raise InputError(f"is {sizes[1]}, but the left image is {sizes[0]}", path=right)
+        matched = self._matching.disparity_px(*grey)
+        return CameraFrame(stamp_ns, files[0], encode_gray(coded_disparity(matched)), None)
+
+
+def _grey(data: bytes, path: Path) -> NDArray[np.uint8]:
+    return np.asarray(cv2.cvtColor(decode_colour(data, path), cv2.COLOR_RGB2GRAY), np.uint8)

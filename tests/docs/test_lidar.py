@@ -1,0 +1,75 @@
+"""What docs/lidar.md shows is run on small data, and its tables are those of the code."""
+
+import shlex
+from pathlib import Path
+
+import pytest
+import yaml
+from click.testing import CliRunner
+from support.kitti_tree import Sequence
+from support.pages import blocks, commands, text_of
+
+from semgrid_eval.cli.main import cli
+from semgrid_eval.config import parse_config
+from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.scores.results import read_run
+from semgrid_eval.sources.argoverse2.categories import CATEGORIES
+from semgrid_eval.sources.kitti.labels import CLASSES
+
+PAGE = text_of("docs/lidar.md")
+LIDAR, TRACKS = "logs", "drives"
+COMMANDS = [line for line in commands(PAGE) if line.startswith("semgrid-eval ")]
+MATRICES = [block for block in blocks("yaml", PAGE) if "\nrows:" in block]
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, text in zip(("lidar.yaml", "tracks.yaml"), MATRICES, strict=True):
+        Path(name).write_text(text)
+    return tmp_path
+
+
+def run(folder):
+    """Run the commands that work on a folder of logs, in their order."""
+    for line in COMMANDS:
+        if folder in line or f"runs/{'lidar' if folder == LIDAR else 'tracks'}" in line:
+            done = CliRunner().invoke(cli, shlex.split(line)[1:], standalone_mode=False)
+            assert done.return_value in (0, None), f"{line}\n{done.output}\n{done.exception}"
+
+
+def test_commands_for_kitti(workplace):
+    ground = tuple((float(x), float(y), -1.6) for x in range(4, 40) for y in range(-6, 7))
+    for name in ("05", "07"):
+        Sequence(frames=8, points=ground, labels=(40,) * len(ground)).write(workplace / "SRC", name)
+    run(LIDAR)
+    rows = read_run(Path("runs/lidar")).rows
+    assert {row.name: row.failure for row in rows} == dict.fromkeys(("BL-NT", "BL-DC", "BL-Fuse"))
+
+
+def test_commands_for_argoverse(workplace):
+    pytest.importorskip("pyarrow", reason="the extra `argoverse` is not installed")
+    from support.argoverse_log import write_argoverse
+
+    write_argoverse(workplace / "SRC", frames=14)
+    Path("tracks.yaml").write_text(MATRICES[1].replace("[1, 2, 3]", "[3]"))
+    run(TRACKS)
+    exec(blocks("python", PAGE)[0], {})
+    assert [path.name for path in Path("wrong/val").iterdir()] == ["drive.mcap"]
+    rows = read_run(Path("runs/tracks")).rows
+    assert {row.name: row.failure for row in rows} == dict.fromkeys(("BL-NT-3", "BL-DC-3", "BL-Flow-3", "RN-town-3"))
+
+
+def test_other_settings_of_the_page_are_valid():
+    (block,) = [yaml.safe_load(each) for each in blocks("yaml", PAGE) if "\nrows:" not in each]
+    assert parse_config(GridConfig, block["grid"]).target_row == "top+left"
+
+
+@pytest.mark.parametrize(
+    ("title", "known"),
+    [("SemanticKITTI", dict(CLASSES.values())), ("Argoverse", CATEGORIES)],
+)
+def test_the_maps_of_labels_are_those_of_the_code(title, known):
+    table = PAGE.split(f"| {title} | Cityscapes |\n|---|---|\n")[1].split("\n\n")[0]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
+    assert {name.strip(): label for names, label in rows for name in names.split(",")} == known
