@@ -1,5 +1,6 @@
 """The layout of panels for Foxglove and Lichtblick: the same for all rows of a log with the same cameras."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,7 +12,7 @@ _TITLES = ("foxglovePanelTitle", "lichtblickPanelTitle")
 """Keys of a panel's title: Foxglove's, and that of Lichtblick, which knows the other one no more."""
 _SENSORS = 8  # of a row, shown over each other; what a log does not have is not shown
 _REACH_M = 105.0  # that the panels show
-_PICTURES_PERCENT = 30.0
+_PICTURES_PERCENT = 27.0
 _CAMERA_STATE = {
     "perspective": False,
     "distance": _REACH_M,
@@ -27,25 +28,21 @@ _CAMERA_STATE = {
 
 
 def viewer_layout(rows: Sequence[bool], cameras: Sequence[str], *, inputs: bool = True) -> dict[str, Any]:
-    """Lay out panels for the rows of a log, in columns from left to right, and pictures of the first camera.
+    """Lay out panels of grids for the rows of a log, and beside them pictures of the first camera and the legend.
 
     Args:
         rows: for each row whether it says how sure it is.
         cameras: of the log; without one there is the legend alone.
         inputs: whether the log has them.
     """
-    panels = _pictures(cameras)
-    columns: list[list[str]] = [list(panels)]
-    for column in [_seen(inputs=inputs), *(_row(number, unsure) for number, unsure in enumerate(rows, start=1))]:
-        panels |= column
-        columns.append(list(column))
-    pictures, *grids = (_divided("column", each) for each in columns)
+    pictures, grids = _pictures(cameras), _grids(rows, inputs=inputs)
+    beside, above = _divided("column", list(pictures)), _tiled(list(grids))
     return {
-        "configById": panels,
+        "configById": {**pictures, **grids},
         "globalVariables": {},
         "userNodes": {},
         "playbackConfig": {"speed": 1},
-        "layout": _split("row", pictures, _divided("row", grids), _PICTURES_PERCENT),
+        "layout": _split("row", beside, above, _PICTURES_PERCENT),
     }
 
 
@@ -59,20 +56,16 @@ def _pictures(cameras: Sequence[str]) -> dict[str, dict[str, Any]]:
     return {**shown, **legend}
 
 
-def _seen(*, inputs: bool) -> dict[str, dict[str, Any]]:
+def _grids(rows: Sequence[bool], *, inputs: bool) -> dict[str, dict[str, Any]]:
     newest = [f"{topics.GRID_INPUT}/1/{sensor}" for sensor in range(1, _SENSORS + 1)]
-    title = "Newest input of row 1, moved to the target's time"
-    panels = {"3D!input": _above(title, newest)} if inputs else {}
-    target = [topics.GRID_TARGET, f"{topics.GRID_MASK}/1"]
-    return {**panels, "3D!target": _above("Target; white is left out of scores", target)}
-
-
-def _row(number: int, unsure: bool) -> dict[str, dict[str, Any]]:
-    topic = f"{topics.GRID_PREDICTION}/{number}"
-    panels = {f"3D!prediction{number}": _above(f"Prediction {number}", [topic], [f"{topic}/name"])}
-    if unsure:
-        certainty = [f"{topics.GRID_CERTAINTY}/{number}"]
-        panels[f"3D!certainty{number}"] = _above(f"Certainty {number}; white is 1", certainty)
+    panels = {"3D!input": _above("Newest input of row 1, moved to the target's time", newest)} if inputs else {}
+    panels["3D!target"] = _above("Target; white is left out of scores", [topics.GRID_TARGET, f"{topics.GRID_MASK}/1"])
+    for number in range(1, len(rows) + 1):
+        topic = f"{topics.GRID_PREDICTION}/{number}"
+        panels[f"3D!prediction{number}"] = _above(f"Prediction {number}", [topic], [f"{topic}/name"])
+    for number in (number for number, unsure in enumerate(rows, start=1) if unsure):
+        title = f"Certainty {number}; white is 1"
+        panels[f"3D!certainty{number}"] = _above(title, [f"{topics.GRID_CERTAINTY}/{number}"])
     return panels
 
 
@@ -116,6 +109,13 @@ def _divided(direction: str, nodes: Sequence[Node]) -> Node:
     """Put nodes beside or below each other, all of one size."""
     first, *rest = nodes
     return _split(direction, first, _divided(direction, rest), 100 / len(nodes)) if rest else first
+
+
+def _tiled(nodes: Sequence[Node]) -> Node:
+    """Put nodes into a square, line by line: a grid is as wide as it is high."""
+    across = math.ceil(math.sqrt(len(nodes)))
+    lines = [_divided("row", nodes[start : start + across]) for start in range(0, len(nodes), across)]
+    return _divided("column", lines)
 
 
 def _split(direction: str, first: Node, second: Node, percent: float) -> Node:

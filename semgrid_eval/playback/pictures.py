@@ -27,7 +27,7 @@ from semgrid_eval.recording.png import encode_gray, with_palette
 Grid = NDArray[np.uint8]
 _MASKED = CLASS_COUNT
 _LINE_PX, _SWATCH_PX, _TEXT_PX, _EDGE_PX = 26, 18, 16, 10
-_TEXT_M = 5.0  # height of a row's name beside its grid
+_TEXT_M = 4.0  # height of a row's name beside its grid
 _WIDTH_OF_LETTER = 0.6  # of its height
 _BACKGROUND, _INK, _FRAME = (32, 32, 36), (235, 235, 235), (120, 120, 120)
 

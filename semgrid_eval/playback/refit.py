@@ -19,7 +19,7 @@ from semgrid_eval.runs.job import id_of_result
 from semgrid_eval.runs.matrix import Matrix
 from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.runner import RunOptions, make_worker
-from semgrid_eval.scores.results import ResultRecord
+from semgrid_eval.scores.results import ResultRecord, read_run
 
 CPU = torch.device("cpu")
 
@@ -94,8 +94,10 @@ def _learned_again(record: ResultRecord, row: Row, sources: Sources) -> Model:
         raise InputError("it learns from grids that are not there", path=sources.grids)
     matrix = Matrix(title="", seed=record.seed or 0, rows=(row,))
     worker = make_worker(matrix, sources.logs, sources.run, RunOptions("cpu", sources.grids, ""), silent_stage)
+    # What is counted does not depend on threads, but ids of trainings do.
+    worker.threads = int(read_run(sources.run).machine.get("torch_threads", worker.threads))
     job = worker.look(row, record.seed)
     if job.result_id != record.id:
-        raise InputError("it would learn from other logs than those that it has learned from", path=sources.logs)
+        raise InputError("what it would learn here, from these logs, is not what it has learned", path=sources.logs)
     with seeded(record.seed or 0, CPU):
         return worker.fitted(job).model
