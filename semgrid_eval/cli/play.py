@@ -18,6 +18,7 @@ _TRAININGS = "Trained networks of the run.  [default: RUN/trainings]"
 @click.option("--all", "every_recording", is_flag=True, help="Play all recordings, one after the other.")
 @click.option("--stream", "live", is_flag=True, help="Play streams as a viewer would have seen them live.")
 @click.option("--trainings", type=click.Path(path_type=Path), help=_TRAININGS)
+@click.option("--grids", type=click.Path(path_type=Path), help="Grid cache of the run.  [default: RUN/grids]")
 @click.option("--force", is_flag=True, help="Replace --out and the layout beside it, whatever they are.")
 def command(
     run: Path,
@@ -26,6 +27,7 @@ def command(
     logs: Path | None,
     recording: str | None,
     trainings: Path | None,
+    grids: Path | None,
     *,
     every_recording: bool,
     live: bool,
@@ -59,7 +61,7 @@ def command(
         raise click.UsageError("--recording names one recording, --all plays all of them")
     if every_recording and live:
         raise click.UsageError("--stream plays the one recording that a run keeps, and --all all of them")
-    play = Play(run, rows, logs, trainings, recording, every_recording, live)
+    play = Play(run, rows, logs, trainings, grids, recording, every_recording, live)
     with progress("play") as shown:
         written = write_playback(play, out, force=force, progress=shown)
     for note in written.notes:

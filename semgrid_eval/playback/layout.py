@@ -9,7 +9,7 @@ from semgrid_eval.log.topics import camera_topic
 
 Node = str | dict[str, Any]
 _TITLES = ("foxglovePanelTitle", "lichtblickPanelTitle")
-"""Keys of a panel's title: Foxglove's, and that of Lichtblick, which knows the other one no more."""
+"""Keys of a panel's title: of Foxglove, and of Lichtblick, which does not read that of Foxglove."""
 _SENSORS = 8  # of a row, shown over each other; what a log does not have is not shown
 _REACH_M = 105.0  # that the panels show
 _PICTURES_PERCENT = 27.0

@@ -25,16 +25,12 @@ CPU = torch.device("cpu")
 
 
 class Sources(NamedTuple):
-    """Folders of a run, of its trainings and of its logs."""
+    """Folders of a run, of its trainings, of its grids and of its logs."""
 
     run: Path
     trainings: Path
+    grids: Path
     logs: Path
-
-    @property
-    def grids(self) -> Path:
-        """Folder of the grids that the run has made."""
-        return self.run / "grids"
 
 
 def row_of(scored: Scored) -> Row:
@@ -91,7 +87,7 @@ def _training_of(record: ResultRecord, trainings: Path) -> Path:
 
 def _learned_again(record: ResultRecord, row: Row, sources: Sources) -> Model:
     if not sources.grids.is_dir():
-        raise InputError("it learns from grids that are not there", path=sources.grids)
+        raise InputError("it learns from grids that are not there; name their folder with --grids", path=sources.grids)
     matrix = Matrix(title="", seed=record.seed or 0, rows=(row,))
     worker = make_worker(matrix, sources.logs, sources.run, RunOptions("cpu", sources.grids, ""), silent_stage)
     # What is counted does not depend on threads, but ids of trainings do.

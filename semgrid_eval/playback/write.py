@@ -44,6 +44,7 @@ class Play:
         logs: folder of the run's logs; with it come pictures, calibration, the vehicle's way, and every possible target
             instead of those that were scored.
         trainings: folder of the run's trainings, its own if not given.
+        grids: folder in which the run keeps grids, its own if not given.
         recording: the one to play; the first if not given.
         every_recording: play all of them one after the other, later ones shifted in time.
         live: play the recording that streams keep as a viewer would have seen it, see `playback.live`.
@@ -53,9 +54,18 @@ class Play:
     rows: tuple[str, ...]
     logs: Path | None = None
     trainings: Path | None = None
+    grids: Path | None = None
     recording: str | None = None
     every_recording: bool = False
     live: bool = False
+
+    @property
+    def sources(self) -> Sources | None:
+        """What predictions are made from again, where there are logs."""
+        if self.logs is None:
+            return None
+        trainings, grids = self.trainings or self.run / "trainings", self.grids or self.run / "grids"
+        return Sources(self.run, trainings, grids, self.logs)
 
 
 @dataclass(frozen=True)
@@ -119,7 +129,7 @@ class _Player:
             read(play.run, find_row(self.record, name, play.run)) for name in play.rows
         )
         require_alike(self.rows)
-        self._again = play.logs and Again(Sources(play.run, play.trainings or play.run / "trainings", play.logs))
+        self._again = Again(play.sources) if play.sources else None
 
     @property
     def notes(self) -> list[str]:
