@@ -1,5 +1,7 @@
 """Foxglove Studio 1.48 in headless Chromium: the last version whose code is public, from its package on npm."""
 
+import io
+import json
 import os
 import re
 import shutil
@@ -11,8 +13,14 @@ from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
+from semgrid_eval.classes import CLASSES
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
 PACKAGES = ("@foxglove/studio-base@1.48.0", "react@17.0.2", "react-dom@17.0.2")
 PAGE = Path(__file__).parents[1] / "viewers" / "page.html"
 ASKED = "SEMGRID_VIEWERS"
@@ -27,8 +35,12 @@ FLAGS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
-    "--window-size=1600,1000",
+    "--window-size=1500,950",
 )
+
+
+PATIENCE_S = 240  # until something is given up that takes a few seconds
+_HEADERS = "header[data-testid=mosaic-drag-handle]"
 
 
 def require_viewers():
@@ -106,3 +118,49 @@ def served(log, layout, folder):
     finally:
         server.shutdown()
         server.server_close()
+
+
+@contextmanager
+def opened(log, layout, folder):
+    """Open a log and its layout in Studio, in a browser without a sidebar; all panels of the layout are there."""
+    from selenium import webdriver
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in (*FLAGS, f"--user-data-dir={folder / 'profile'}"):
+        options.add_argument(flag)
+    count = len(json.loads(layout.read_text())["configById"])
+    (folder / "page").mkdir(parents=True)
+    with served(log, layout, folder / "page") as address:
+        driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+        try:
+            driver.get(address)
+            until(driver, lambda: len(panels(driver)) == count)
+            ActionChains(driver).key_down(Keys.CONTROL).send_keys("b").key_up(Keys.CONTROL).perform()
+            yield driver
+        finally:
+            driver.quit()
+
+
+def until(driver, found):
+    """Return what is found, as soon as there is something."""
+    from selenium.webdriver.support.wait import WebDriverWait
+
+    return WebDriverWait(driver, PATIENCE_S, poll_frequency=1).until(lambda _: found())
+
+
+def panels(driver):
+    """All panels by their titles."""
+    script = """
+    return [...document.querySelectorAll(arguments[0])]
+      .map(header => [header.innerText.split("\\n")[0].trim(), header.closest(".mosaic-tile")])
+    """
+    return dict(driver.execute_script(script, _HEADERS))
+
+
+def colours(panel):
+    """How many pixels of each class's colour a panel shows."""
+    picture = np.asarray(Image.open(io.BytesIO(panel.screenshot_as_png)).convert("RGB"))
+    return {each.name: int((picture == each.colour).all(axis=-1).sum()) for each in CLASSES}
