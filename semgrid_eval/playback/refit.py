@@ -3,12 +3,10 @@
 from pathlib import Path
 from typing import NamedTuple
 
-import torch
-
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.checkpoint import WEIGHTS_FILE, load_weights
-from semgrid_eval.models.device import seeded, settle_process
+from semgrid_eval.models.device import choose_device, seeded, settle_process
 from semgrid_eval.models.fitting import Lesson, fit_model
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.network import Network, seeded_network
@@ -21,7 +19,7 @@ from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.runner import RunOptions, make_worker
 from semgrid_eval.scores.results import ResultRecord, read_run
 
-CPU = torch.device("cpu")
+_CPU = choose_device("cpu")
 
 
 class Sources(NamedTuple):
@@ -73,8 +71,8 @@ def model_of(scored: Scored, row: Row, sources: Sources) -> Model:
         return network.eval()
     if made.learns():
         return _learned_again(record, row, sources)
-    with seeded(record.seed or 0, CPU):
-        return fit_model(made, settings, Lesson(row.given, record.seed or 0, CPU)).model
+    with seeded(record.seed or 0, _CPU):
+        return fit_model(made, settings, Lesson(row.given, record.seed or 0, _CPU)).model
 
 
 def _training_of(record: ResultRecord, trainings: Path) -> Path:
@@ -95,5 +93,5 @@ def _learned_again(record: ResultRecord, row: Row, sources: Sources) -> Model:
     job = worker.look(row, record.seed)
     if job.result_id != record.id:
         raise InputError("what it would learn here, from these logs, is not what it has learned", path=sources.logs)
-    with seeded(record.seed or 0, CPU):
+    with seeded(record.seed or 0, _CPU):
         return worker.fitted(job).model

@@ -40,7 +40,7 @@ class Scored:
             found[windows[i].recording].append(i)
         return found
 
-    @property
+    @cached_property
     def is_unsure(self) -> bool:
         """Whether the model says how sure it is: one that answers with classes alone is certain of every cell."""
         return bool((self.arrays["certainty"] != _CERTAIN).any())

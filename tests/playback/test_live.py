@@ -155,6 +155,17 @@ def test_an_answer_for_one_time_of_evaluation_is_there_at_that_time_alone(play):
     assert times == [log_ns for log_ns, _, _ in play("exact", "/grid/target")][1:]
 
 
+def test_streams_lie_side_by_side_each_as_it_is_alone(made, play, tmp_path):
+    written = write_playback(Play(made / "run", ("moved", "still"), made / "logs", live=True), tmp_path / "both.mcap")
+    for number, name in enumerate(("moved", "still"), start=1):
+        for form in ("", "/exact", "/picture"):
+            alone = play(name, f"/grid/prediction/1{form}")
+            assert messages(written.log, f"/grid/prediction/{number}{form}") == alone, (name, form)
+    assert messages(written.log, "/grid/target") == play("moved", "/grid/target")
+    with pytest.raises(InputError, match="row plain: is scored window by window"):
+        write_playback(Play(made / "run", ("moved", "plain"), live=True), tmp_path / "mixed.mcap")
+
+
 def test_of_answers_that_come_after_the_end_nothing_is_drawn(play):
     assert len(play("late", "/grid/target")) == FRAMES
     assert play("late", "/grid/prediction/1") == play("late", "/grid/certainty/1") == []

@@ -7,9 +7,12 @@ from support.studio import CHROMIUM, DRIVER, colours, opened, panels, require_vi
 from semgrid_eval.playback.write import Play, write_playback
 
 pytest.importorskip("selenium", reason="Selenium is not installed (pip install selenium)")
-pytestmark = pytest.mark.skipif(
-    not (CHROMIUM and DRIVER), reason="no Chromium with chromedriver is installed (apt install chromium-driver)"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (CHROMIUM and DRIVER), reason="no Chromium with chromedriver is installed (apt install chromium-driver)"
+    ),
+]
 TITLES = [
     "Camera",
     "Labels",
