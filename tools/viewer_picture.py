@@ -4,14 +4,10 @@ Example: PYTHONPATH=.:tests python tools/viewer_picture.py play.mcap docs/viewer
 """
 
 import sys
-from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from PIL import Image
 from support.studio import colours, opened, panels, until
-
-_COLOURS = 128
 
 
 def main(log: Path, picture: Path) -> None:
@@ -23,8 +19,7 @@ def main(log: Path, picture: Path) -> None:
         for title, panel in panels(driver).items():
             if title.startswith(("Newest", "Target", "Prediction", "Legend")):
                 until(driver, lambda panel=panel: colours(panel)["road"] > 0)
-        taken = Image.open(BytesIO(driver.get_screenshot_as_png())).convert("RGB")
-    taken.quantize(_COLOURS, dither=Image.Dither.NONE).save(picture, optimize=True)
+        picture.write_bytes(driver.get_screenshot_as_png())
 
 
 if __name__ == "__main__":
