@@ -41,8 +41,8 @@ def row_of(scored: Scored) -> Row:
     facts, config = scored.row.facts, scored.record.config
     if facts.model not in MODELS:
         raise InputError("its model is code of one's own, which only `semgrid-eval run` runs")
-    if config["code"] != version_of(facts.model):
-        raise InputError(f"version {config['code']} of its model was scored, and this is {version_of(facts.model)}")
+    if (scored_by := config.get("code")) != version_of(facts.model):
+        raise InputError(f"version {scored_by} of its model was scored, and this is {version_of(facts.model)}")
     row = parse_config(
         Row, {"name": scored.row.name, **{key: config[key] for key in config if key in Row.model_fields}}
     )

@@ -5,8 +5,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import tempfile
 import threading
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -16,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from support.npm import kept
 
 from semgrid_eval.classes import CLASSES
 
@@ -47,30 +46,6 @@ def require_viewers():
     """Skip a test that downloads a viewer, unless viewers are asked for."""
     if not os.environ.get(ASKED):
         pytest.skip(f"viewers are some 60 MB from npm and take a minute: set {ASKED}=1 to test with them")
-
-
-def packages():
-    """The folder of the installed packages, kept between runs; skips the test where they cannot be had."""
-    if shutil.which("npm") is None:
-        pytest.skip("npm is needed to get Foxglove Studio")
-    folder = Path(tempfile.gettempdir()) / f"semgrid-eval-studio-{os.getuid()}-1.48.0"
-    if not folder.is_dir():
-        with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
-            _install(Path(scratch) / "studio")
-            with suppress(OSError):  # another process was faster
-                (Path(scratch) / "studio").rename(folder)
-    return folder / "node_modules"
-
-
-def _install(folder):
-    folder.mkdir()
-    quiet = ("--no-audit", "--no-fund", "--ignore-scripts", "--legacy-peer-deps", "--fetch-retries=0")
-    try:
-        command = ["npm", "install", "--prefix", str(folder), *quiet, *PACKAGES]
-        subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
-    except subprocess.SubprocessError as error:
-        reason = str(getattr(error, "stderr", None) or error).splitlines()[0]
-        pytest.skip(f"npm cannot install {' and '.join(PACKAGES)} here: {reason}")
 
 
 class _Ranged(SimpleHTTPRequestHandler):
@@ -108,7 +83,7 @@ class _Ranged(SimpleHTTPRequestHandler):
 @contextmanager
 def served(log, layout, folder):
     """Serve Studio with a log and a layout on loopback, and return the address of the page."""
-    (folder / "node_modules").symlink_to(packages())
+    (folder / "node_modules").symlink_to(kept("studio-1.48.0", PACKAGES, timeout_s=300) / "node_modules")
     for source, name in ((PAGE, "page.html"), (log, "play.mcap"), (layout, "play.layout.json")):
         shutil.copy(source, folder / name)
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Ranged, directory=str(folder)))
