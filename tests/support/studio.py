@@ -45,7 +45,7 @@ _HEADERS = "header[data-testid=mosaic-drag-handle]"
 def require_viewers():
     """Skip a test that downloads a viewer, unless viewers are asked for."""
     if not os.environ.get(ASKED):
-        pytest.skip(f"viewers are some 60 MB from npm and take a minute: set {ASKED}=1 to test with them")
+        pytest.skip(f"Foxglove Studio is 36 MB from npm and takes a minute: set {ASKED}=1 to test with them")
 
 
 class _Ranged(SimpleHTTPRequestHandler):
