@@ -25,6 +25,7 @@ GRID_MASK = "/grid/mask"
 GRID_CERTAINTY = "/grid/certainty"
 GRID_PREDICTION = "/grid/prediction"
 GRID_INPUT = "/grid/input"
+GRID_LEGEND = "/grid/legend"
 
 BASE_FRAME = "base_link"  # ISO 8855 vehicle frame: x forward, y left, z up, on the ground under the rear axle
 ODOM_FRAME = "odom"  # where the vehicle was, and pointed to, at the first sample

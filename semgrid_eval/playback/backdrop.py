@@ -1,35 +1,19 @@
-"""What a viewer wants beside grids: pictures, their calibration, where the vehicle is, and the layout of panels."""
+"""What surrounds grids: pictures, their calibration, and where the vehicle is."""
 
 import heapq
-import json
-import re
-from collections.abc import Iterator, Sequence
-from importlib import resources
-from typing import Any, NamedTuple
+from collections.abc import Iterator
 
-from google.protobuf.message import Message
-
-from semgrid_eval.errors import InputError, LogError, printable
+from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.reader import LogReader
-from semgrid_eval.log.topics import GRID_INPUT, GRID_PREDICTION, camera_topic
+from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.playback.outgoing import Outgoing
 from semgrid_eval.recording.colour import read_size
 from semgrid_eval.recording.types import Pose
-from semgrid_eval.scores.results import RowRecord
 from semgrid_eval.sensors.camera import frame_poses
 
 _PICTURES = (topics.IMAGE, topics.LABEL)
-
-
-class Outgoing(NamedTuple):
-    """A message to write, with the arguments of `MessageWriter.write`."""
-
-    log_ns: int
-    topic: str
-    message: Message
-    publish_ns: int | None = None
-    notes: dict[str, str] | None = None
 
 
 class Backdrop:
@@ -93,32 +77,3 @@ class Backdrop:
             return read_size(png)
         except InputError as error:
             raise LogError(str(error), path=self._log.path, field=topic) from error
-
-
-_TEMPLATE = "data/foxglove_layout.json"
-
-
-def viewer_layout(row: RowRecord, cameras: Sequence[str]) -> dict[str, Any]:
-    """Fill the template for a row and the first of the cameras; without a camera, the panels of pictures go."""
-    text = resources.files("semgrid_eval").joinpath(_TEMPLATE).read_text(encoding="utf-8")
-    text = text.replace("{prediction}", prediction_topic(row.name))
-    text = text.replace("{camera}", cameras[0] if cameras else "").replace(
-        "{row}", json.dumps(printable(row.name))[1:-1]
-    )
-    layout: dict[str, Any] = json.loads(text)
-    shown = layout["configById"]["3D!input"]["topics"]
-    settings = shown.pop(f"{GRID_INPUT}/{{sensor}}")
-    shown.update({f"{GRID_INPUT}/{sensor}": settings for sensor in row.facts.sensors})
-    if row.facts.stream is not None:  # its inputs are not kept
-        del layout["configById"]["3D!input"]
-        layout["layout"]["second"]["first"] = "3D!certainty"
-    if not cameras:
-        panels = layout["configById"]
-        layout["configById"] = {name: panels[name] for name in panels if not name.startswith("Image!")}
-        layout["layout"] = layout["layout"]["second"]
-    return layout
-
-
-def prediction_topic(row_name: str) -> str:
-    """Return the topic of a row's predictions; characters that mean something to viewers become underscores."""
-    return f"{GRID_PREDICTION}/{re.sub(r'[^A-Za-z0-9_.-]', '_', row_name)}"

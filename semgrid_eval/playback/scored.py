@@ -17,6 +17,7 @@ from semgrid_eval.log.reader import LogReader
 from semgrid_eval.scores import results
 
 _LISTED_NAMES = 10
+_CERTAIN = 255
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,15 @@ class Scored:
         for i in sorted(range(len(windows)), key=lambda i: windows[i].target_stamp_ns):
             found[windows[i].recording].append(i)
         return found
+
+    @cached_property
+    def is_unsure(self) -> bool:
+        """Whether the model says how sure it is: one that answers with classes alone is certain of every cell."""
+        return bool((self.arrays["certainty"] != _CERTAIN).any())
+
+    def log_of(self, recording: str) -> str:
+        """Return the path of a recording's log below the folder of logs."""
+        return self.record.windows[self.windows_of[recording][0]].log
 
     @property
     def kept(self) -> list[str]:
@@ -103,18 +113,34 @@ def _first_with(file: str, run: Path, row: results.RowRecord) -> tuple[results.R
     return record, parse_config(GridConfig, record.config.get("grid"), path=folder / "result.json"), folder
 
 
-def choose_recordings(scored: Scored, recording: str | None, *, every_recording: bool) -> list[str]:
-    """Name the recordings that are asked for, the first if none is; an InputError says that there is no such one."""
-    names = scored.kept
-    if every_recording:
-        return names
-    if recording is None:
-        return names[:1]
-    if recording not in names:
-        kind = "kept" if scored.record.stream else "scored"
-        fault = f"there is no {kind} recording {recording!r}, only {_listed(names)}"
-        raise InputError(fault, field=f"row {scored.row.name}")
-    return [recording]
+def require_alike(rows: Sequence[Scored]) -> None:
+    """Make sure that rows can be played side by side.
+
+    Raises:
+        InputError: their targets are not grids of the same kind.
+    """
+    first = rows[0]
+    for other in rows[1:]:
+        if other.grid.target_identity() != first.grid.target_identity():
+            fault = f"its targets are other grids than those of {first.row.name}; play them one by one"
+            raise InputError(fault, field=f"row {other.row.name}")
+
+
+def choose_recordings(rows: Sequence[Scored], recording: str | None, *, every_recording: bool) -> list[str]:
+    """Name the recordings that are asked for, the first that all rows have if none is.
+
+    Raises:
+        InputError: there is no such recording.
+    """
+    first, *others = rows
+    names = [name for name in first.kept if all(name in other.kept for other in others)]
+    wanted = names[:1] if recording is None else [recording]
+    if not names or wanted[0] not in names:
+        kind = "kept" if first.record.stream else "scored"
+        which = "" if recording is None else f" {recording!r}"
+        fault = f"there is no {kind} recording{which}, only {_listed(names) or 'others for each row'}"
+        raise InputError(fault, field=f"row {', '.join(each.row.name for each in rows)}")
+    return names if every_recording else wanted
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -126,7 +152,7 @@ def open_scored_log(record: results.RunRecord, scored: Scored, name: str, logs: 
     """Open the log of a recording; a LogError says that it is not the one that was scored."""
     if not logs.is_dir():
         raise InputError("is not a folder", path=logs)
-    path = scored.record.windows[scored.windows_of[name][0]].log
+    path = scored.log_of(name)
     log = stack.enter_context(LogReader(logs / path))
     known = results.scored_digest(record, scored.record, path)
     if log.digest not in (scored.record.log_digests if known is None else (known,)):

@@ -1,5 +1,6 @@
 """A unit resolved: its model, windows, training and the ids under which all of it is kept."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,6 +62,11 @@ class Job:
 def id_of_windows(row: Row, scored: WindowSet) -> str:
     """Digest what decides the windows that a run keeps."""
     return digest_value([SCORING_VERSION, GRIDS, scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
+
+
+def id_of_result(config: Mapping[str, object], windows_id: str, training_id: str | None, seed: int | None) -> str:
+    """Digest all that decides a result: its row with what that depends on, its windows, and what was learned."""
+    return digest_value([results.FORMAT_VERSION, SCORING_VERSION, config, windows_id, [training_id, seed]])
 
 
 def target_key(job: Job) -> str:

@@ -26,7 +26,7 @@ from semgrid_eval.models.registry import MODELS, described, version_of
 from semgrid_eval.models.stand_in import make_ready
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.data import GridSource, grid_digest
-from semgrid_eval.runs.job import SCORING_VERSION, Job, Resolved, Training, id_of_windows, target_key, window_records
+from semgrid_eval.runs.job import Job, Resolved, Training, id_of_result, id_of_windows, target_key, window_records
 from semgrid_eval.runs.recorded import RecordedRows
 from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.selection import Selection, Wanted
@@ -82,8 +82,7 @@ class Worker:
         config = {**row.identity(), **told, "code": resolved.version}
         if asks_of_truth(row) and self.scored_data.cache is not None:
             config["truth"] = truth_versions()
-        learned = [training and training.id, seed]
-        result_id = digest_value([results.FORMAT_VERSION, SCORING_VERSION, config, windows_id, learned])
+        result_id = id_of_result(config, windows_id, training.id if training else None, seed)
         return Job(row, seed, resolved, result_id, config, scored, windows_id, training, left_out, stream)
 
     def stream(self, row: Row) -> StreamPlan:
@@ -111,7 +110,7 @@ class Worker:
             return job
         watched = unchanged(self.out, row.model) if job.resolved.is_own else nullcontext()
         with watched, seeded(seed or 0, self.device):
-            fitted = self._fitted(job)
+            fitted = self.fitted(job)
             evaluation = self._evaluated(job, fitted.model)
         self._keep_windows(job)  # code of one's own may have removed them
         record = self._result_record(job, fitted, evaluation)
@@ -224,7 +223,7 @@ class Worker:
         )
         return Training(training_id, self.trainings / training_id, windows, watched)
 
-    def _fitted(self, job: Job) -> Fitted:
+    def fitted(self, job: Job) -> Fitted:
         """Make the job's model ready to predict."""
         made, settings, seed = job.resolved.model, job.resolved.settings, job.seed or 0
         lesson = Lesson(job.row.given, seed, self.device)

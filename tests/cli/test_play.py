@@ -46,7 +46,7 @@ def test_example_of_play_writes_a_log_and_a_layout(here):
     assert Path("play.layout.json").is_file()
     with Path("play.mcap").open("rb") as stream:
         topics = {channel.topic for channel in make_reader(stream).get_summary().channels.values()}
-    assert {"/grid/target", "/grid/prediction/BL-DC", "/camera/front/image", "/tf"} <= topics
+    assert {"/grid/target", "/grid/prediction/1", "/camera/front/image", "/tf"} <= topics
 
 
 def test_inputs_are_moved_for_a_row_without_translation_too_as_the_help_says(here):
@@ -55,12 +55,12 @@ def test_inputs_are_moved_for_a_row_without_translation_too_as_the_help_says(her
     for row in ("BL-DC", "BL-NT"):
         call("play", "runs/first", row, "--out", f"{row}.mcap", "--logs", "logs")
         with Path(f"{row}.mcap").open("rb") as stream:
-            found = make_reader(stream).iter_messages(["/grid/input/full/exact", f"/grid/prediction/{row}/exact"])
+            found = make_reader(stream).iter_messages(["/grid/input/1/1/exact", "/grid/prediction/1/exact"])
             played[row] = {
-                channel.topic.rsplit("/", 2)[1]: read_exact(message.data)[0].tobytes() for _, channel, message in found
+                channel.topic.split("/")[2]: read_exact(message.data)[0].tobytes() for _, channel, message in found
             }
-    assert played["BL-NT"]["full"] == played["BL-DC"]["full"] == played["BL-DC"]["BL-DC"]
-    assert played["BL-NT"]["BL-NT"] != played["BL-NT"]["full"]
+    assert played["BL-NT"]["input"] == played["BL-DC"]["input"] == played["BL-DC"]["prediction"]
+    assert played["BL-NT"]["prediction"] != played["BL-NT"]["input"]
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_a_layout_that_somebody_changed_is_not_replaced_unless_it_is_forced(here
             call("play", "runs/first", "BL-DC", "--out", "play.mcap")
         call("play", "runs/first", "BL-DC", "--out", "play.mcap", "--force")
         call("play", "runs/first", "BL-NT", "--out", "play.mcap")  # written by `play`, so it goes with its log
-        layout.write_text(layout.read_text().replace("BL-NT", "mine"))
+        layout.write_text(layout.read_text().replace("Target", "mine"))
 
 
 @pytest.mark.parametrize("place", ["logs/play.mcap", "logs/val/play.mcap", "logs/new/play.mcap", "others/play.mcap"])

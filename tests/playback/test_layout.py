@@ -1,15 +1,6 @@
-import re
-
 import pytest
-from support.fake_run import facts
 
-from semgrid_eval.errors import printable
-from semgrid_eval.playback.backdrop import prediction_topic, viewer_layout
-from semgrid_eval.scores.results import RowRecord
-
-
-def row(name="ED-DC", sensors=("full",)):
-    return RowRecord(facts=facts("ED", sensors), name=name, label=name)
+from semgrid_eval.playback.layout import viewer_layout
 
 
 def panels(node):
@@ -18,36 +9,42 @@ def panels(node):
 
 
 @pytest.mark.parametrize("cameras", [(), ("front",), ("front", "rear")])
-def test_every_panel_is_placed_once_and_configured(cameras):
-    layout = viewer_layout(row(), cameras)
+@pytest.mark.parametrize("rows", [[False], [True], [True, False, True, True]])
+@pytest.mark.parametrize("inputs", [True, False])
+def test_every_panel_is_placed_once_and_configured(cameras, rows, inputs):
+    layout = viewer_layout(rows, cameras, inputs=inputs)
     placed = panels(layout["layout"])
     assert sorted(placed) == sorted(layout["configById"])
     assert len(set(placed)) == len(placed)
     assert ("Image!image" in placed) == bool(cameras)
+    assert ("3D!input" in placed) == inputs
+    assert "Image!legend" in placed
 
 
 def test_pictures_are_those_of_the_first_camera():
-    shown = viewer_layout(row(), ("front", "rear"))["configById"]
+    shown = viewer_layout([True], ("front", "rear"))["configById"]
     assert shown["Image!label"]["imageMode"]["imageTopic"] == "/camera/front/label"
     assert shown["Image!label"]["imageMode"]["calibrationTopic"] == "/camera/front/calibration"
+    assert shown["Image!legend"]["imageMode"] == {"imageTopic": "/grid/legend"}
 
 
-def test_grids_of_the_row_and_all_its_sensors_are_shown_in_their_own_colours():
-    shown = viewer_layout(row(sensors=("near", "far")), ())["configById"]
-    assert list(shown["3D!input"]["topics"]) == ["/grid/input/near", "/grid/input/far"]
-    assert list(shown["3D!target"]["topics"]) == ["/grid/target", "/grid/mask"]
-    assert list(shown["3D!prediction"]["topics"]) == ["/grid/prediction/ED-DC"]
-    for name in ("3D!input", "3D!target", "3D!prediction", "3D!certainty"):
-        for settings in shown[name]["topics"].values():
-            assert (settings["visible"], settings["colorMode"]) == (True, "rgba-fields")
+def test_each_row_has_a_panel_and_certainty_only_where_it_has_one_all_in_their_own_colours():
+    shown = viewer_layout([False, True], ())["configById"]
+    assert list(shown["3D!input"]["topics"])[:2] == ["/grid/input/1/1", "/grid/input/1/2"]
+    assert list(shown["3D!target"]["topics"]) == ["/grid/target", "/grid/mask/1"]
+    assert list(shown["3D!prediction1"]["topics"]) == ["/grid/prediction/1", "/grid/prediction/1/name"]
+    assert list(shown["3D!prediction2"]["topics"]) == ["/grid/prediction/2", "/grid/prediction/2/name"]
+    assert [name for name in shown if "certainty" in name] == ["3D!certainty2"]
+    for name in ("3D!input", "3D!target", "3D!prediction2", "3D!certainty2"):
+        settings = next(iter(shown[name]["topics"].values()))
+        assert (settings["visible"], settings["colorMode"]) == (True, "rgba-fields")
 
 
-@pytest.mark.parametrize("name", ['say "hi" \\ {camera}', "a/b c", "Zürich\n", "\x1b[31mred"])
-def test_any_name_of_a_row_gives_a_layout_and_a_plain_topic(name):
-    shown = viewer_layout(row(name), ("front",))["configById"]["3D!prediction"]
-    assert shown["foxglovePanelTitle"] == f"Prediction of {printable(name)}"
-    assert list(shown["topics"]) == [prediction_topic(name)]
-    assert re.fullmatch(r"/grid/prediction/[\w.-]+", prediction_topic(name))
+def test_panels_have_titles_for_foxglove_and_for_lichtblick_that_tell_them_apart():
+    shown = viewer_layout([True, True], ("front",))["configById"]
+    titles = [panel["foxglovePanelTitle"] for panel in shown.values()]
+    assert titles == [panel["lichtblickPanelTitle"] for panel in shown.values()]
+    assert len(set(titles)) == len(titles) == 9
 
 
 RENDERER = {
@@ -61,7 +58,7 @@ RENDERER = {
     "publish",
     "synchronize",
 }
-PANEL = RENDERER | {"foxglovePanelTitle", "imageMode"}
+PANEL = RENDERER | {"foxglovePanelTitle", "lichtblickPanelTitle", "imageMode"}
 CAMERA = {"perspective", "distance", "phi", "thetaOffset", "fovy", "near", "far"}
 CAMERA_POINTS = {"targetOffset": 3, "target": 3, "targetOrientation": 4}
 IMAGE_MODE = {"imageTopic", "calibrationTopic"}
@@ -71,7 +68,7 @@ GRID = {"visible", "colorMode", "colorField", "interpolationMethod"}
 @pytest.mark.parametrize("cameras", [(), ("front",)])
 def test_the_layout_has_the_form_that_viewers_read(cameras):
     """As Lichtblick's `LayoutData` and `RendererConfig`, and Foxglove's layout types, have it."""
-    layout = viewer_layout(row(), cameras)
+    layout = viewer_layout([True, False], cameras)
     assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
     assert isinstance(layout["playbackConfig"]["speed"], float | int)
     check_mosaic(layout["layout"])
@@ -83,9 +80,11 @@ def test_the_layout_has_the_form_that_viewers_read(cameras):
         assert panel["followMode"] in ("follow-pose", "follow-position", "follow-none")
         assert panel["publish"]["type"] in ("point", "pose", "pose_estimate")
         check_camera(panel["cameraState"])
-        assert set(panel["imageMode"]) == (IMAGE_MODE if kind == "Image" else set())
+        assert set(panel["imageMode"]) in ([IMAGE_MODE, {"imageTopic"}] if kind == "Image" else [set()])
         for settings in panel["topics"].values():
-            assert set(settings) <= GRID
+            assert set(settings) in (GRID, {"visible"})
+            if set(settings) == {"visible"}:  # of a scene
+                continue
             assert settings["colorMode"] in ("flat", "gradient", "colormap", "rgba-fields")
             assert settings["interpolationMethod"] in ("linear", "nearestNeighbor")
 

@@ -18,7 +18,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.log.codec import stamp_ns
 from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
 from semgrid_eval.log.store import write_log
-from semgrid_eval.playback.write import write_playback
+from semgrid_eval.playback.write import Play, write_playback
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores import results
 
@@ -32,7 +32,7 @@ ROWS = {
     "late": {"latency_ms": 60_000},
     "plain": None,
 }
-TOPIC = "/grid/prediction/moved"
+TOPIC = "/grid/prediction/1"
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +53,13 @@ def made(tmp_path_factory):
 @pytest.fixture(scope="module")
 def play(made):
     for name in ("moved", "still", "exact", "late"):
-        write_playback(made / "run", name, made / f"{name}.mcap", logs=made / "logs", live=True)
+        write(made / "run", name, made / f"{name}.mcap", logs=made / "logs", live=True)
     return lambda name, topic: messages(made / f"{name}.mcap", topic)
+
+
+def write(run, row, out, **options):
+    """Play one row."""
+    return write_playback(Play(run, (row,), **options), out)
 
 
 def messages(path, topic):
@@ -84,7 +89,7 @@ def test_answers_are_drawn_again_at_each_time_of_evaluation_and_targets_at_their
     published = {log_ns for log_ns, _, _ in play("moved", f"{TOPIC}/exact")}
     frames = {at(frame) for frame in range(2, FRAMES)}
     assert drawn == sorted(frames | published)
-    for topic in ("/grid/target", "/grid/mask", "/grid/target/exact"):
+    for topic in ("/grid/target", "/grid/mask/1", "/grid/target/exact"):
         assert [log_ns for log_ns, _, _ in play("moved", topic)] == [at(frame) for frame in range(FRAMES)]
 
 
@@ -92,7 +97,7 @@ def places(play, name):
     """Where viewers draw the grid's corner in the odom frame at frames, by the answer: the publication's time."""
     frames = {log_ns: FrameTransforms.FromString(data).transforms for log_ns, _, data in play(name, "/tf")}
     found = {}
-    for log_ns, publish_ns, data in play(name, f"/grid/prediction/{name}"):
+    for log_ns, publish_ns, data in play(name, "/grid/prediction/1"):
         if log_ns in frames:
             grid = next(part for part in frames[log_ns] if part.child_frame_id == "grid")
             corner, yaw_rad = Grid.FromString(data).pose.position, 2 * math.atan2(grid.rotation.z, grid.rotation.w)
@@ -145,14 +150,25 @@ def test_a_stream_that_was_played_scores_as_recorded_answers_to_the_count(made, 
 
 
 def test_an_answer_for_one_time_of_evaluation_is_there_at_that_time_alone(play):
-    times = [log_ns for log_ns, _, _ in play("exact", "/grid/prediction/exact")]
-    assert times == [log_ns for log_ns, _, _ in play("exact", "/grid/prediction/exact/exact")]
+    times = [log_ns for log_ns, _, _ in play("exact", "/grid/prediction/1")]
+    assert times == [log_ns for log_ns, _, _ in play("exact", "/grid/prediction/1/exact")]
     assert times == [log_ns for log_ns, _, _ in play("exact", "/grid/target")][1:]
+
+
+def test_streams_lie_side_by_side_each_as_it_is_alone(made, play, tmp_path):
+    written = write_playback(Play(made / "run", ("moved", "still"), made / "logs", live=True), tmp_path / "both.mcap")
+    for number, name in enumerate(("moved", "still"), start=1):
+        for form in ("", "/exact", "/picture"):
+            alone = play(name, f"/grid/prediction/1{form}")
+            assert messages(written.log, f"/grid/prediction/{number}{form}") == alone, (name, form)
+    assert messages(written.log, "/grid/target") == play("moved", "/grid/target")
+    with pytest.raises(InputError, match="row plain: is scored window by window"):
+        write_playback(Play(made / "run", ("moved", "plain"), live=True), tmp_path / "mixed.mcap")
 
 
 def test_of_answers_that_come_after_the_end_nothing_is_drawn(play):
     assert len(play("late", "/grid/target")) == FRAMES
-    assert play("late", "/grid/prediction/late") == play("late", "/grid/certainty") == []
+    assert play("late", "/grid/prediction/1") == play("late", "/grid/certainty/1") == []
 
 
 @pytest.mark.parametrize(
@@ -165,7 +181,7 @@ def test_of_answers_that_come_after_the_end_nothing_is_drawn(play):
 )
 def test_what_cannot_be_played_is_told(made, tmp_path, row, options, fault):
     with pytest.raises(InputError, match=fault):
-        write_playback(made / "run", row, tmp_path / "a.mcap", **options)
+        write(made / "run", row, tmp_path / "a.mcap", **options)
     assert not list(tmp_path.iterdir())
 
 

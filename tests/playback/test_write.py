@@ -1,3 +1,4 @@
+import json
 import math
 import re
 import shutil
@@ -18,7 +19,7 @@ from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.log.codec import stamp_ns
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
-from semgrid_eval.playback.write import GAP_NS, write_playback
+from semgrid_eval.playback.write import GAP_NS, Play, write_playback
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores import results
@@ -61,6 +62,11 @@ def kept(run, name):
     return record, {**windows, **results.read_predictions(folder)}
 
 
+def write(run, row, out, **options):
+    """Play one row."""
+    return write_playback(Play(run, (row,), **options), out)
+
+
 def played(path, topic):
     """Log time, publish time and data of a topic's messages."""
     with path.open("rb") as stream:
@@ -73,49 +79,52 @@ def exact(path, topic):
 
 
 def test_every_message_is_decoded_by_an_independent_reader(run, logs, tmp_path):
-    write_playback(run, "two sensors/1", tmp_path / "play.mcap", logs=logs)
+    write(run, "two sensors/1", tmp_path / "play.mcap", logs=logs)
     found = read(reader_script(), tmp_path / "play.mcap")
     assert found["done"]
-    inputs = [f"/grid/input/split2_{end}{older}" for end in ("upper", "lower") for older in ("", "/before_1")]
-    grids = [*inputs, "/grid/target", "/grid/mask", "/grid/prediction/two_sensors_1", "/grid/certainty"]
-    pictures = dict.fromkeys(("/tf", *(f"/camera/front/{name}" for name in ("image", "label", "calibration"))), 10)
-    exacts = {f"{topic}/exact": 4 for topic in grids if "certainty" not in topic}
-    assert Counter(m["topic"] for m in found["messages"]) == {**dict.fromkeys(grids, 4), **exacts, **pictures}
+    inputs = [f"/grid/input/1/{sensor}{older}" for sensor in (1, 2) for older in ("", "/before_1")]
+    grids = [*inputs, "/grid/target", "/grid/mask/1", "/grid/prediction/1"]
+    shown = [f"{topic}/picture" for topic in grids if "mask" not in topic and "before" not in topic]
+    around = dict.fromkeys(("/tf", *(f"/camera/front/{name}" for name in ("image", "label", "calibration"))), 4)
+    once = dict.fromkeys(("/grid/legend", "/grid/prediction/1/name"), 1)
+    each = dict.fromkeys([*grids, *shown, *(f"{topic}/exact" for topic in grids)], 4)
+    assert Counter(m["topic"] for m in found["messages"]) == {**each, **around, **once}
     record, arrays = kept(run, "two sensors/1")
-    prediction = of_topic(found, "/grid/prediction/two_sensors_1/exact")
+    prediction = of_topic(found, "/grid/prediction/1/exact")
     assert [m["value"]["class_ids"] for m in prediction] == [
         sha256(grid.tobytes()) for grid in arrays["prediction"][:4]
     ]
-    assert {m["schema"] for m in of_topic(found, "/grid/certainty")} == {"foxglove.Grid"}
+    assert {m["schema"] for m in of_topic(found, "/grid/prediction/1")} == {"foxglove.Grid"}
+    assert {m["schema"] for m in of_topic(found, "/grid/prediction/1/picture")} == {"foxglove.CompressedImage"}
     stamps = [(str(w.target_stamp_ns), str(w.input_stamps_ns[-1])) for w in record.windows[:4]]
     assert [(m["log_ns"], m["publish_ns"]) for m in prediction] == stamps
-    assert found["metadata"]["semgrid.playback"]["row"] == "two sensors/1"
-    assert found["metadata"]["semgrid.playback"]["result"] == record.id
+    rows = [{"row": "two sensors/1", "result": record.id, "seed": None}]
+    assert json.loads(found["metadata"]["semgrid.playback"]["rows"]) == rows
 
 
 def test_grids_are_those_of_the_run_at_the_times_they_hold_for(run, logs, tmp_path):
-    write_playback(run, "BL-DC", tmp_path / "play.mcap", logs=logs, recording="toy1#2")
+    write(run, "BL-DC", tmp_path / "play.mcap", logs=logs, recording="toy1#2")
     record, arrays = kept(run, "BL-DC")
     at = [i for i, window in enumerate(record.windows) if window.recording == "toy1#2"]
     path = tmp_path / "play.mcap"
     for topic, expected in (
         ("/grid/target", arrays["target"]),
-        ("/grid/mask", arrays["mask"]),
-        ("/grid/prediction/BL-DC", arrays["prediction"]),
-        ("/grid/input/full", arrays["inputs"][:, 0, -1]),
-        ("/grid/input/full/before_1", arrays["inputs"][:, 0, 0]),
+        ("/grid/mask/1", arrays["mask"]),
+        ("/grid/prediction/1", arrays["prediction"]),
+        ("/grid/input/1/1", arrays["inputs"][:, 0, -1]),
+        ("/grid/input/1/1/before_1", arrays["inputs"][:, 0, 0]),
     ):
         assert np.array_equal(exact(path, topic), expected[at]), topic
     targets = [10**18 + frame * FRAME_NS for frame in range(16, 20)]
-    for topic, back in (("/grid/target", 0), ("/grid/input/full", 3), ("/grid/input/full/before_1", 6)):
+    for topic, back in (("/grid/target", 0), ("/grid/input/1/1", 3), ("/grid/input/1/1/before_1", 6)):
         times = [(log, publish) for log, publish, _ in played(path, topic)]
         assert times == [(now, now - back * FRAME_NS) for now in targets], topic
 
 
 def test_pictures_of_the_windows_time_come_from_the_log(run, logs, tmp_path):
-    write_playback(run, "BL-DC", tmp_path / "play.mcap", logs=logs, recording="toy0#2")
+    write(run, "BL-DC", tmp_path / "play.mcap", logs=logs, recording="toy0#2")
     with LogReader(logs / "val" / "toy0.mcap") as log:
-        source = [entry[:3] for entry in log.messages(["/camera/front/image"])][10:]
+        source = [entry[:3] for entry in log.messages(["/camera/front/image"])][16:]
     shown = [
         ("/camera/front/image", log_ns, data)
         for log_ns, _, data in played(tmp_path / "play.mcap", "/camera/front/image")
@@ -145,7 +154,7 @@ def road_in_odom(path, *, turned=True):
 
 def test_grids_of_a_later_stretch_of_a_turning_drive_lie_where_the_street_is(run, logs, tmp_path):
     for number in (1, 2):
-        write_playback(run, "BL-DC", tmp_path / f"{number}.mcap", logs=logs, recording=f"toy0#{number}")
+        write(run, "BL-DC", tmp_path / f"{number}.mcap", logs=logs, recording=f"toy0#{number}")
     (early_m, early_yaw_rad), (late_m, late_yaw_rad) = (road_in_odom(tmp_path / f"{n}.mcap") for n in (1, 2))
     unturned_m, _ = road_in_odom(tmp_path / "2.mcap", turned=False)
     assert early_yaw_rad == pytest.approx(0.0)
@@ -157,31 +166,31 @@ def test_grids_of_a_later_stretch_of_a_turning_drive_lie_where_the_street_is(run
 
 
 def test_all_recordings_follow_each_other_a_second_apart(run, logs, tmp_path):
-    written = write_playback(run, "BL-DC", tmp_path / "all.mcap", logs=logs, every_recording=True)
+    written = write(run, "BL-DC", tmp_path / "all.mcap", logs=logs, every_recording=True)
     assert written.recordings == ("toy0#1", "toy0#2", "toy1#1", "toy1#2")
     times = [log_ns for log_ns, _, _ in played(written.log, "/tf")]
     gaps = np.diff(times)
-    assert np.flatnonzero(gaps != FRAME_NS).tolist() == [9, 19, 29]
-    assert set(gaps[[9, 19, 29]].tolist()) == {GAP_NS}
-    assert times[0] == 10**18, "the first recording keeps its times"
-    for topic in ("/grid/target", "/grid/prediction/BL-DC"):
+    assert np.flatnonzero(gaps != FRAME_NS).tolist() == [3, 7, 11]
+    assert set(gaps[[3, 7, 11]].tolist()) == {GAP_NS}
+    assert times[0] == 10**18 + 6 * FRAME_NS, "the first recording keeps its times, and begins with its first target"
+    for topic in ("/grid/target", "/grid/prediction/1"):
         found = played(written.log, topic)
         assert len(found) == 16
         assert [stamp_ns(Grid.FromString(data).timestamp) for _, _, data in found] == [now for now, _, _ in found]
-    leads = {log_ns - publish_ns for log_ns, publish_ns, _ in played(written.log, "/grid/prediction/BL-DC")}
+    leads = {log_ns - publish_ns for log_ns, publish_ns, _ in played(written.log, "/grid/prediction/1")}
     assert leads == {3 * FRAME_NS}
 
 
 def test_same_input_gives_same_bytes(run, logs, tmp_path):
     files = [tmp_path / name / "play.mcap" for name in ("a", "b")]
     for file in files:
-        write_playback(run, "BL-DC", file, logs=logs, every_recording=True)
+        write(run, "BL-DC", file, logs=logs, every_recording=True)
     assert files[0].read_bytes() == files[1].read_bytes()
     assert sorted(path.name for path in files[0].parent.iterdir()) == ["play.layout.json", "play.mcap"]
 
 
 def test_without_logs_there_are_grids_alone(run, tmp_path):
-    written = write_playback(run, "BL-DC", tmp_path / "play.mcap")
+    written = write(run, "BL-DC", tmp_path / "play.mcap")
     with written.log.open("rb") as stream:
         names = {channel.topic for channel in make_reader(stream).get_summary().channels.values()}
     assert {name.split("/")[1] for name in names} == {"grid", "tf"}
@@ -210,7 +219,7 @@ def test_a_users_mistake_is_told_and_leaves_nothing(run, logs, tmp_path, row, op
     if "logs" in options:
         options = {"logs": tmp_path / options["logs"]}
     with pytest.raises(SemgridError, match=re.escape(message)) as error:
-        write_playback(run, row, tmp_path / "out" / "play.mcap", **options)
+        write(run, row, tmp_path / "out" / "play.mcap", **options)
     assert "\n" not in str(error.value)
     assert not list(tmp_path.rglob("play*"))
 
@@ -221,14 +230,14 @@ def test_a_log_to_train_on_may_have_the_same_path_as_one_to_score(run, logs, tmp
     record = results.read_run(copy)
     same_paths = tuple(log.model_copy(update={"digest": f"{i:016x}"}) for i, log in enumerate(record.logs))
     results.write_run(copy, record.model_copy(update={"logs": same_paths + record.logs}))
-    assert write_playback(copy, "BL-DC", tmp_path / "play.mcap", logs=logs).recordings == ("toy0#1",)
+    assert write(copy, "BL-DC", tmp_path / "play.mcap", logs=logs).recordings == ("toy0#1",)
 
 
 def test_a_row_that_kept_no_predictions_is_told(run, tmp_path):
     copy = tmp_path / "run"
     shutil.copytree(run, copy, ignore=shutil.ignore_patterns("predictions.npz"))
     with pytest.raises(InputError, match="row BL-DC: none of its results kept its predictions"):
-        write_playback(copy, "BL-DC", tmp_path / "play.mcap")
+        write(copy, "BL-DC", tmp_path / "play.mcap")
 
 
 def test_arrays_of_another_shape_are_refused(run, tmp_path):
@@ -238,11 +247,11 @@ def test_arrays_of_another_shape_are_refused(run, tmp_path):
         arrays = results.read_arrays(path, ("inputs", "target", "mask"))
         results.write_arrays(path, {**arrays, "target": arrays["target"][:, :-1]}, owner=path.stem)
     with pytest.raises(InputError, match=r"target: has shape \(16, 127, 128\), not \(16, 128, 128\)"):
-        write_playback(copy, "BL-DC", tmp_path / "play.mcap")
+        write(copy, "BL-DC", tmp_path / "play.mcap")
 
 
 def test_a_log_is_never_overwritten(run, logs):
     before = (logs / "val" / "toy0.mcap").read_bytes()
     with pytest.raises(InputError, match=r"toy0.mcap: lies in the folder of logs"):
-        write_playback(run, "BL-DC", logs / "val" / "toy0.mcap", logs=logs)
+        write(run, "BL-DC", logs / "val" / "toy0.mcap", logs=logs)
     assert (logs / "val" / "toy0.mcap").read_bytes() == before

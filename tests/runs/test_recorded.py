@@ -11,7 +11,7 @@ import semgrid_eval as sg
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.playback.export import export_predictions, write_predictions
-from semgrid_eval.playback.write import write_playback
+from semgrid_eval.playback.write import Play, write_playback
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
 
@@ -83,7 +83,7 @@ def test_a_played_log_is_a_log_of_predictions(exported, logs, tmp_path):
     folder.mkdir()
     names = dict.fromkeys(window.recording for window in record_of(exported / "made", "table").windows)
     for number, name in enumerate(names):
-        write_playback(exported / "made", "table", folder / f"{number}.mcap", recording=name)
+        write_playback(Play(exported / "made", ("table",), recording=name), folder / f"{number}.mcap")
     run([logged(folder)], logs, tmp_path / "out", window=ALL)
     expected, found = sums_of(exported / "made", "table"), sums_of(tmp_path / "out", "logged")
     for key, counted in expected.items():

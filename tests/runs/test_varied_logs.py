@@ -96,4 +96,10 @@ def test_a_report_is_written_and_every_recording_played(place):
     call("play", place / "run", "ED-NT", "--logs", place / "logs", "--all", "--out", place / "play.mcap")
     with (place / "play.mcap").open("rb") as stream:
         topics = {channel.topic for channel in make_reader(stream).get_summary().channels.values()}
-    assert {"/grid/prediction/ED-NT", "/camera/front/image", "/camera/front/calibration"} <= topics
+    assert {
+        "/grid/prediction/1",
+        "/grid/certainty/1",
+        "/grid/legend",
+        "/camera/front/image",
+        "/camera/front/calibration",
+    } <= topics

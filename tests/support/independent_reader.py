@@ -2,14 +2,12 @@
 
 import hashlib
 import json
-import os
 import shutil
 import subprocess
-import tempfile
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from support.npm import kept
 
 PACKAGES = ("@mcap/core@2.2.2", "@mcap/support@1.1.0")
 SCRIPT = Path(__file__).parents[1] / "log" / "independent_reader" / "read.mjs"
@@ -20,26 +18,7 @@ def reader_script():
     if shutil.which("node") is None or shutil.which("npm") is None:
         pytest.skip("node and npm are needed to read a log with the reference implementation for JavaScript")
     version = hashlib.sha256(" ".join(PACKAGES).encode() + SCRIPT.read_bytes()).hexdigest()[:12]
-    folder = Path(tempfile.gettempdir()) / f"semgrid-eval-reader-{os.getuid()}-{version}"
-    if not folder.is_dir():
-        with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
-            fresh = Path(scratch) / "reader"
-            install(fresh)
-            with suppress(OSError):  # another process of the same suite was faster
-                fresh.rename(folder)
-    return folder / SCRIPT.name
-
-
-def install(folder):
-    folder.mkdir()
-    shutil.copy(SCRIPT, folder)
-    quiet = ("--no-audit", "--no-fund", "--ignore-scripts", "--fetch-retries=0")
-    try:
-        command = ["npm", "install", "--prefix", str(folder), *quiet, *PACKAGES]
-        subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
-    except subprocess.SubprocessError as error:
-        reason = str(getattr(error, "stderr", None) or error).splitlines()[0]
-        pytest.skip(f"npm cannot install {' and '.join(PACKAGES)} here: {reason}")
+    return kept(f"reader-{version}", PACKAGES, [SCRIPT]) / SCRIPT.name
 
 
 def read(script, path):

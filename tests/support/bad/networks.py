@@ -145,7 +145,9 @@ KIND = Kind(
         _given("--mean that is not finite", "--mean nan 0 0"),
         _given("--size 0", "--size 0 4"),
         _given("--out in the folder of the logs", "--out logs/new"),
-        Bad("a log without colour images", SEGMENT, spoil=lambda: _write(lambda frame: replace(frame, image_file=None))),
+        Bad(
+            "a log without colour images", SEGMENT, spoil=lambda: _write(lambda frame: replace(frame, image_file=None))
+        ),
         Bad(
             "two logs of one name",
             "segment logs more --model net.onnx --out out",
