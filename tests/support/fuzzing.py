@@ -18,6 +18,7 @@ from support import damage
 from support.bad import cityscapes, contracts, matrices, yaml_files
 from support.cityscapes_tree import CAMERA
 from support.driving import driving
+from support.fuzzing_bags import bag_inputs, read_bag
 from support.mutations import KINDS as KEPT
 from support.mutations import make_run
 
@@ -395,5 +396,6 @@ KINDS: dict[str, Kind] = {
     "resealed png": Kind(all_png_inputs, read_png, resealed_png, has_checksums=False),
     "json": Kind(json_inputs, read_of_kind, words, has_checksums=False),
     "yaml": Kind(yaml_inputs, read_of_kind, words, has_checksums=False),
+    "bag": Kind(bag_inputs, read_bag, anyhow, has_checksums=False),
     **{kind: _kept(kind) for kind in KEPT},
 }

@@ -15,7 +15,16 @@ from support.mutations import KINDS as KEPT
 from semgrid_eval.errors import InputError
 
 TOOL = Path(__file__).parents[2] / "tools" / "fuzz.py"
-COUNTS = {"log": 60, "recovery": 60, "resealed log": 60, "png": 200, "resealed png": 200, "json": 200, "yaml": 60}
+COUNTS = {
+    "log": 60,
+    "recovery": 60,
+    "resealed log": 60,
+    "png": 200,
+    "resealed png": 200,
+    "json": 200,
+    "yaml": 60,
+    "bag": 40,
+}
 
 
 @pytest.fixture(scope="module")
