@@ -29,7 +29,7 @@ PACKAGE ?= build/package
 PACKAGE_COMMANDS := "convert synthetic logs --recordings 4 --towns 2 --town-size-m 250 --duration-s 15" "check logs" \
   "run smoke --logs logs --out run" "report run" "play run ED-DC --logs logs --out play.mcap"
 
-.PHONY: demo test check docs reference fuzz licences soak package test-lowest test-pythons clean
+.PHONY: demo test test-all check docs reference fuzz licences soak package test-lowest test-pythons clean
 
 demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo
@@ -40,6 +40,10 @@ reference: $(READY)  ## the paper's table on the simulated town: 15 trainings, t
 
 test: $(READY)  ## the whole suite
 	$(BIN)/python -m pytest -n auto --dist loadfile
+
+test-all: $(READY)  ## all of it: the suite with a real viewer, the site, the wheel, lowest and other versions, a longer fuzz
+	SEMGRID_VIEWERS=1 $(BIN)/python -m pytest -n auto --dist loadfile -rs
+	$(MAKE) docs package test-lowest test-pythons fuzz
 
 soak: $(READY)  ## kills, stops, full disks and two processes in one folder: the same bytes in the end; some ten minutes
 	rm -rf $(SOAK)

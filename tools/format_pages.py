@@ -71,6 +71,17 @@ HEAD = """# Formats
 are values outside of the limits.*
 
 """
+POLICY = """## When a format changes
+
+- **Logs** say the version of their format (record `recording`). A version that this package does not know is refused, in a
+  line. New channels and new keys do not change it; what would make old numbers wrong does, and then old logs are converted
+  again from their source.
+- **Results, grids, trainings** are named by digests of all that decides them, their format among it. Results of another
+  format are refused by `report` and made again by `run`; nothing is read by guess.
+- **Matrices, maps, contracts, profiles** are checked key by key: what is no longer there is an error that names it.
+- Versions follow Semantic Versioning, and CHANGELOG.md says what is made again.
+
+"""
 LOGS = """## Logs
 
 Logs are MCAP files with Protobuf messages, of Foxglove's types where there is one and of `schemas/` else. `{camera}`
@@ -195,7 +206,7 @@ def page() -> str:
         section("Latency profiles", PROFILE, profile),
         section("Results", RESULTS, results),
     )
-    return HEAD + LOGS + "".join("".join(part) for part in parts).rstrip() + "\n"
+    return HEAD + POLICY + LOGS + "".join("".join(part) for part in parts).rstrip() + "\n"
 
 
 if __name__ == "__main__":
