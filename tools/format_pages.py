@@ -73,9 +73,9 @@ are values outside of the limits.*
 """
 POLICY = """## When a format changes
 
-- **Logs** say the version of their format (record `recording`). A version that this package does not know is refused, in a
-  line. New channels and new keys do not change it; what would make old numbers wrong does, and then old logs are converted
-  again from their source.
+- **Logs** say the version of their format (record `recording`). A version that this package does not know is refused,
+  in a line. New channels and new keys do not change it; what would make old numbers wrong does, and then old logs are
+  converted again from their source.
 - **Results, grids, trainings** are named by digests of all that decides them, their format among it. Results of another
   format are refused by `report` and made again by `run`; nothing is read by guess.
 - **Matrices, maps, contracts, profiles** are checked key by key: what is no longer there is an error that names it.
