@@ -1,5 +1,7 @@
 """Settings of the whole suite: the same examples every time, no clocks."""
 
+import sys
+
 import pytest
 from hypothesis import settings
 
@@ -10,13 +12,13 @@ settings.register_profile("suite", deadline=None, derandomize=True, database=Non
 settings.load_profile("suite")
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def same_threads_after():
-    """Give numeric libraries their numbers of threads back after a test that sets them."""
-    import cv2
-    import torch
-
-    of_torch, of_opencv = torch.get_num_threads(), cv2.getNumThreads()
+    """Give numeric libraries their numbers of threads back, which commands set, where they are imported at all."""
+    torch, cv2 = sys.modules.get("torch"), sys.modules.get("cv2")
+    of_torch, of_opencv = torch and torch.get_num_threads(), cv2 and cv2.getNumThreads()
     yield
-    torch.set_num_threads(of_torch)
-    cv2.setNumThreads(of_opencv)
+    if torch:
+        torch.set_num_threads(of_torch)
+    if cv2:
+        cv2.setNumThreads(of_opencv)

@@ -9,8 +9,6 @@ from semgrid_eval.cli.main import cli, main
 from semgrid_eval.log.store import write_log
 from semgrid_eval.streams.profile import LatencyProfile, read_profile
 
-pytestmark = pytest.mark.usefixtures("same_threads_after")
-
 
 @pytest.fixture
 def logs(tmp_path, monkeypatch):

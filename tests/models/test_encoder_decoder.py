@@ -129,7 +129,7 @@ def test_label_says_its_depth_and_features():
 
 
 def test_impossible_configurations_are_refused():
-    with pytest.raises(ConfigError, match="features must be even"):
+    with pytest.raises(ConfigError, match="features: 7 is odd"):
         parse_config(EncoderDecoderSettings, {"features": 7})
     with pytest.raises(ConfigError, match="settings: depth 4 needs grids of a multiple of 8 cells, not 100 x 100"):
         EncoderDecoder.check(EncoderDecoderSettings(depth=4), given(size=100))

@@ -77,7 +77,7 @@ def test_what_another_run_does_meanwhile_is_in_the_record(work):
 
 
 def test_a_misspelt_row_is_told_before_anything_is_built(work, tmp_path):
-    with pytest.raises(ConfigError, match="'BB' is not a row"):
+    with pytest.raises(ConfigError, match="'BB' is not one of BL, ED"):
         work([BL, ED], only=("BB",))
     assert not (tmp_path / "grids").exists()
 

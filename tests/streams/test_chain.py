@@ -28,9 +28,6 @@ WHOLE = FRAMES - WINDOW.span_frames
 CPU = torch.device("cpu")
 
 
-pytestmark = pytest.mark.usefixtures("same_threads_after")
-
-
 class Watching(Model):
     """Keeps what it is shown."""
 

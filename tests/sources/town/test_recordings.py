@@ -218,7 +218,7 @@ def test_more_windows_than_the_traffic_holds_are_refused_with_what_to_do():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"recordings": 0}, r"recordings: .*found 0"),
+        ({"recordings": 0}, r"recordings: must be at least 1, not 0"),
         ({"recordings": 10**9}, "recordings"),
         ({"width": 100_000}, r"width: .*4096"),
         ({"height": 1}, "height"),
