@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 
-from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file
 from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.contents import Contents, Seen, look_at
@@ -14,19 +13,19 @@ _NS_PER_MS = 1e6
 
 
 def inspect_bags(paths: Sequence[Path], map_file: Path) -> str:
-    """Describe bags, and write a first map of the first one.
+    """Describe bags, and write a first map of the first one; a map file that is there already stays.
 
     Raises:
-        InputError: a bag cannot be read, or there is a map file already.
+        InputError: a bag cannot be read.
     """
-    if map_file.exists():
-        raise InputError("is there already; name another file with --map", path=map_file, field="map")
     texts, first = [], None
     for path in paths:
         contents = look_at(path)
         first = first or contents
         texts.append(f"{path}\n{_table(contents)}")
     assert first is not None
+    if map_file.exists():
+        return "\n\n".join([*texts, f"{map_file} is there already and stays; --map names another one to write"])
     with atomic_file(map_file) as stream:
         stream.write(draft_map(first).encode())
     texts.append(f"{map_file} is a first map: read it, then: semgrid-eval convert ros2 BAG... OUT --map {map_file}")
