@@ -10,6 +10,7 @@ import pytest
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
+LOADED_S = 240.0  # in which any page is there, on a machine as busy as it may be
 FLAGS = (
     "--headless=new",
     "--no-sandbox",
@@ -50,3 +51,14 @@ def open_page(browser: Any, page: Path, *, width: int, height: int = 900, end: s
     browser.get_log("performance")
     browser.get_log("browser")
     browser.get(page.as_uri() + end)
+    _wait_for(browser, page.as_uri())
+
+
+def _wait_for(browser: Any, address: str) -> None:
+    """Wait until a page is loaded to its end: the driver may return while its last scripts have not run."""
+    from selenium.common import WebDriverException
+    from selenium.webdriver.support.wait import WebDriverWait
+
+    loaded = "return document.readyState === 'complete' && location.href.startsWith(arguments[0])"
+    wait = WebDriverWait(browser, LOADED_S, 0.02, [WebDriverException])  # a script may be cut off by the new page
+    wait.until(lambda each: each.execute_script(loaded, address))
