@@ -45,7 +45,7 @@ def convert(source: str, out: Path | str, *, workers: int = 1, **options: Any) -
     """Convert what a source offers to logs OUT/<split>/<name>.mcap; what is done already is kept.
 
     Args:
-        source: `cityscapes`, `synthetic` or `town-v1`.
+        source: one that `semgrid-eval convert --help` lists, such as `cityscapes`, `ros2` or `synthetic`.
         out: folder of the logs.
         workers: how many logs are written at once.
         options: those of the source's command, with underscores.

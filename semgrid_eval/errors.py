@@ -1,5 +1,7 @@
 """The family of errors that a user can cause; each message is one line that names file, field and value."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -49,6 +51,17 @@ class MissingExtraError(SemgridError):
 
     def __init__(self, extra: str, package: str) -> None:
         super().__init__(f"{package} is not installed; run: pip install 'semgrid-eval[{extra}]'")
+
+
+@contextmanager
+def located(
+    *, path: Path | str | None = None, field: str | None = None, kind: type[InputError] = InputError
+) -> Iterator[None]:
+    """Let an InputError of the block, which it becomes one of a `kind` of, name the file and field that it is of."""
+    try:
+        yield
+    except InputError as error:
+        raise kind(str(error), path=path, field=field) from error
 
 
 def first_line(error: BaseException) -> str:

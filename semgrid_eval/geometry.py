@@ -116,6 +116,11 @@ def rotation_of(quaternion: Quaternion) -> Floats:
     )
 
 
+def yaw_of(rotation: Floats) -> float:
+    """Return the heading (rad) of a rotation (3, 3): where it takes the x axis, seen along z."""
+    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+
+
 def quaternion_of(rotation: Floats) -> Quaternion:
     """Return the quaternion of a rotation (3, 3), its largest part positive (Shepperd's method)."""
     (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()

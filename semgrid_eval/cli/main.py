@@ -18,13 +18,13 @@ from semgrid_eval.errors import SemgridError, printable
 
 COMMANDS = {
     "demo": "All of the below on a simulated town, in some minutes.",
-    "convert": "Recordings to logs: Cityscapes, a simulated town.",
+    "convert": "Recordings to logs: Cityscapes, bags, KITTI, a town.",
     "check": "Is a log whole and plausible? Saves what is whole of it.",
     "segment": "Label images for logs, by a segmentation network.",
     "grids": "Logs to semantic grids, each made once.",
     "run": "Train and score the rows of a matrix.",
     "report": "A run's page, tables and figures.",
-    "play": "What a row predicted, as a log for viewers.",
+    "play": "What rows predicted, as a log for viewers.",
     "cache": "Which grids and towns are kept; removes unused ones.",
     "latency": "How long a perception chain takes on this machine.",
     "bench": "How fast everything is on this machine.",

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import NoReturn, Self
 
 from semgrid_eval.errors import InputError, LogError, SemgridError
 from semgrid_eval.executors import Executor, InProcess, WorkerDied, local_executor
@@ -39,6 +40,12 @@ class ConversionJob:
     split: str  # the folder its log goes to
     digest: str | Callable[[], str]  # of all that determines the content, or what computes it (in the other process)
     load: Callable[[], Recording]  # returns the recording
+
+    @classmethod
+    def failing(cls, name: str, split: str, fault: str) -> Self:
+        """Stand for a recording of which it is known beforehand why it fails."""
+        refuse = partial(_refuse, fault)
+        return cls(name, split, refuse, refuse)
 
     @property
     def label(self) -> str:
@@ -129,6 +136,10 @@ def _convert(job: ConversionJob, out: Path) -> _Outcome:
         disk_full = isinstance(cause, OSError) and cause.errno in _DISK_FULL  # every further log would fail alike
         return _Outcome(written=False, failure=f"{error}{stale}", disk_full=disk_full)
     return _Outcome(written=True)
+
+
+def _refuse(fault: str) -> NoReturn:
+    raise InputError(fault)
 
 
 def _itself(recording: Recording) -> Recording:

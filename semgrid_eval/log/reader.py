@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from itertools import groupby, product
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -119,13 +120,8 @@ class LogReader(Container):
         self.choose_camera(camera)
         known = self._first(camera_topic(camera, topics.CALIBRATION))
         rest = self._first(camera_topic(camera, topics.STEREO))
-        try:
-            with damage_as_log_error(self.path, camera_topic(camera, topics.CALIBRATION)):
-                return codec.read_calibration(known, rest)
-        except LogError:
-            raise
-        except InputError as error:
-            raise LogError(str(error), path=self.path, field=camera_topic(camera, topics.CALIBRATION)) from error
+        with self._faults_at(camera_topic(camera, topics.CALIBRATION)):
+            return codec.read_calibration(known, rest)
 
     def motion(self) -> list[MotionSample]:
         """Return all that the vehicle reported of its motion, finite numbers, in the order of time."""
@@ -193,15 +189,20 @@ class LogReader(Container):
     def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
         """Iterate over what messages say; `decoders` maps topics to what reads their messages."""
         for topic, stamp_ns, data, _ in self.messages(decoders):
-            place = f"{topic} at {stamp_ns} ns"
-            try:
-                with damage_as_log_error(self.path, place):
-                    value = decoders[topic](data)
-            except LogError:
-                raise
-            except InputError as error:
-                raise LogError(str(error), path=self.path, field=place) from error
+            with self._faults_at(f"{topic} at {stamp_ns} ns"):
+                value = decoders[topic](data)
             yield Decoded(topic, stamp_ns, value)
+
+    @contextmanager
+    def _faults_at(self, place: str) -> Iterator[None]:
+        """Let whatever a message in the block is wrong with be a LogError that names its place."""
+        try:
+            with damage_as_log_error(self.path, place):
+                yield
+        except LogError:
+            raise
+        except InputError as error:
+            raise LogError(str(error), path=self.path, field=place) from error
 
     def _values(self, topic: str, decode: Callable[[bytes], T]) -> Iterator[T]:
         return (decoded.value for decoded in self._decoded({topic: decode}))

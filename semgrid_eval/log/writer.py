@@ -10,7 +10,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from semgrid_eval import __version__
 from semgrid_eval.classes import label_palette
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import InputError, located
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.container import MAX_STAMP_NS
 from semgrid_eval.log.sweeps import sweep_message
@@ -202,11 +202,8 @@ class MomentWriter:
 
     def _whole(self, camera: str, channel: str, png: bytes, stamp_ns: int) -> ImageSize:
         """Make sure that a picture can be decoded, so that no log holds another; only colour may be JPEG."""
-        try:
+        with located(field=f"{self._recording.name}: {camera_topic(camera, channel)} at {stamp_ns} ns"):
             if channel == topics.IMAGE:
                 return read_size(png) if self._recording.encoded_here else require_whole(png)
             header = read_header(png) if self._recording.encoded_here else require_pixels(png)
             return ImageSize(header.width, header.height)
-        except InputError as error:
-            place = f"{self._recording.name}: {camera_topic(camera, channel)} at {stamp_ns} ns"
-            raise InputError(str(error), field=place) from error

@@ -5,7 +5,7 @@ frames are made from the log again, and the row's model answers for every target
 that were scored stay as they were scored.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from semgrid_eval.runs.job import window_records
 from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.selection import wanted_lead
 from semgrid_eval.scores.evaluate import answered
+from semgrid_eval.scores.results import WindowRecord
 from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import validation_windows
@@ -51,7 +52,7 @@ class Again:
         row, model = ready
         windows = _every_window(self._recording(log, recording, row.grid), row)
         records = window_records(windows, {recording: scored.log_of(recording)})
-        return RowWindows(scored, records, lambda: self._frames(scored, windows, model))
+        return RowWindows(scored, records, lambda: self._frames(scored, windows, records, model))
 
     def _prepared(self, scored: Scored) -> tuple[Row, Model] | None:
         name = scored.row.name
@@ -75,9 +76,10 @@ class Again:
             raise LogError(f"gives no grids of {name}", path=log)
         return found
 
-    def _frames(self, scored: Scored, windows: WindowSet, model: Model) -> Iterator[Frame]:
+    def _frames(
+        self, scored: Scored, windows: WindowSet, records: Sequence[WindowRecord], model: Model
+    ) -> Iterator[Frame]:
         recording = windows.data.recordings[0]
-        records = window_records(windows, {recording: scored.log_of(recording)})
         there = {scored.record.windows[index].target_stamp_ns: index for index in scored.windows_of[recording]}
         other, compared = 0, 0
         for start in range(0, len(windows), _BATCH):

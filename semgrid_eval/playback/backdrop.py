@@ -3,7 +3,7 @@
 import heapq
 from collections.abc import Iterator
 
-from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.errors import InputError, LogError, located
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.reader import LogReader
@@ -73,7 +73,5 @@ class Backdrop:
             yield Outgoing(now_ns, topic, codec.image_message(now_ns, camera, png), notes=notes[channel])
 
     def _size_px(self, png: bytes, topic: str) -> tuple[int, int]:
-        try:
+        with located(path=self._log.path, field=topic, kind=LogError):
             return read_size(png)
-        except InputError as error:
-            raise LogError(str(error), path=self._log.path, field=topic) from error

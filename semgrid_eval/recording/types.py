@@ -54,6 +54,10 @@ class CameraCalibration:
         return self.ego_from_camera @ CAMERA_FROM_OPTICAL
 
 
+LONGEST_ACTOR_M = 200.0
+"""No actor is longer or wider; a tram of seven parts is not half as long."""
+
+
 @dataclass(frozen=True)
 class Actor:
     """The true box of another road user in the map frame of `Pose`; x, y is the centre of its footprint."""

@@ -3,14 +3,13 @@
 import heapq
 import operator
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.errors import LogError, located
 from semgrid_eval.log.topics import DISPARITY, LABEL, camera_topic
 from semgrid_eval.motion import EgoMotion, Integrator, Pose
 from semgrid_eval.sensors.sensor import Points, SensorConfig
@@ -113,21 +112,12 @@ def _read_camera(
         if not frame.label_png:
             place = f"frame at {frame.stamp_ns} ns"
             raise LogError("has no label image; `semgrid-eval segment` adds them", field=place)
-        with _placed(camera, DISPARITY, frame.stamp_ns):
+        with located(field=f"{camera_topic(camera, DISPARITY)} at {frame.stamp_ns} ns", kind=LogError):
             disparity = decode_gray(frame.disparity_png, bit_depth=16)
-        with _placed(camera, LABEL, frame.stamp_ns):
+        with located(field=f"{camera_topic(camera, LABEL)} at {frame.stamp_ns} ns", kind=LogError):
             label = decode_gray(frame.label_png, bit_depth=8)
         seen = {view: projection.points(disparity, label) for view, projection in projections.items()}
         for name, sensor in sensors.items():
             top, bottom, left, right = sensor.crop_px
             pixels, part = seen[views[name]], np.s_[top:bottom, left:right]
             yield Points(name, frame.stamp_ns, pixels.forward_m[part], pixels.left_m[part], pixels.class_id[part])
-
-
-@contextmanager
-def _placed(camera: str, channel: str, stamp_ns: int) -> Iterator[None]:
-    """Let an error say of which picture it is."""
-    try:
-        yield
-    except InputError as error:
-        raise LogError(str(error), field=f"{camera_topic(camera, channel)} at {stamp_ns} ns") from error

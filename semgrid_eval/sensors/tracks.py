@@ -22,14 +22,12 @@ from semgrid_eval.errors import LogError
 from semgrid_eval.geometry import SE2
 from semgrid_eval.log.topics import TRUE_ACTORS
 from semgrid_eval.recording.road_map import RoadMap
-from semgrid_eval.recording.types import Actor
+from semgrid_eval.recording.types import LONGEST_ACTOR_M, Actor
 from semgrid_eval.sensors.sensor import Morphology, Points, SensorConfig
 
 if TYPE_CHECKING:
     from semgrid_eval.log.reader import LogReader
 
-LONGEST_M = 200.0
-"""No actor is longer or wider; a tram of seven parts is not half as long."""
 _MOST_POINTS = 2500  # ahead, behind, left and right
 Floats = NDArray[np.float64]
 
@@ -74,8 +72,8 @@ def _fault(actor: Actor) -> str:
     """Say what is impossible in a box; empty where nothing is."""
     if not all(math.isfinite(each) for each in (actor.x_m, actor.y_m, actor.yaw_rad)):
         return "is not at a finite place"
-    if not (0.0 < actor.length_m <= LONGEST_M and 0.0 < actor.width_m <= LONGEST_M):
-        return f"is {actor.length_m:g} x {actor.width_m:g} m; 0 to {LONGEST_M:g} m are allowed"
+    if not (0.0 < actor.length_m <= LONGEST_ACTOR_M and 0.0 < actor.width_m <= LONGEST_ACTOR_M):
+        return f"is {actor.length_m:g} x {actor.width_m:g} m; 0 to {LONGEST_ACTOR_M:g} m are allowed"
     return "" if actor.label_id < 256 else f"has label {actor.label_id}"
 
 

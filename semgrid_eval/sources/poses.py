@@ -7,7 +7,7 @@ speed and the first yaw rate are those of their neighbours.
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.geometry import SE3
+from semgrid_eval.geometry import SE3, yaw_of
 from semgrid_eval.recording.types import MotionSample, Pose
 
 _NS_PER_S = 1e9
@@ -40,8 +40,7 @@ def motion_of(poses: list[Pose]) -> tuple[MotionSample, ...]:
 def planar(stamp_ns: int, map_from_vehicle: SE3) -> Pose:
     """Leave height, roll and pitch out of a pose in space."""
     x_m, y_m, _ = map_from_vehicle.translation_m.tolist()
-    yaw_rad = float(np.arctan2(map_from_vehicle.rotation[1, 0], map_from_vehicle.rotation[0, 0]))
-    return Pose(stamp_ns, x_m, y_m, yaw_rad)
+    return Pose(stamp_ns, x_m, y_m, yaw_of(map_from_vehicle.rotation))
 
 
 def _steps_s(stamps_ns: Stamps) -> Floats:

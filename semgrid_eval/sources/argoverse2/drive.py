@@ -3,11 +3,12 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import InputError, located
 from semgrid_eval.files import digest_files, digest_value
 from semgrid_eval.geometry import SE3
 from semgrid_eval.recording import road_map
@@ -47,6 +48,10 @@ class Drive:
 
     def digest(self) -> str:
         """Digest the bytes of all files that are used."""
+        return self._digest
+
+    @cached_property
+    def _digest(self) -> str:
         used = [self._boxes, self._poses, find_archive(self.folder), *self.sweeps.values()]
         for path in used:
             if not path.is_file():
@@ -64,7 +69,7 @@ class Drive:
             split=self.split,
             group=city_of(archive) or self.name,
             calibrations={},
-            source_digest=self.digest(),
+            source_digest=self._digest,
             moments=self._moments,
             source_files={road_map.FILE: read_map(archive).to_json()},
         )
@@ -95,7 +100,5 @@ class Drive:
 def _sweep(stamp_ns: int, path: Path) -> LidarSweep:
     table = read_table(path, _POINTS)
     points_m = np.stack([table[name] for name in "xyz"], axis=1).astype(np.float32)
-    try:
+    with located(path=path):
         return LidarSweep(stamp_ns, _IN_VEHICLE, points_m, table["intensity"].astype(np.float32), None)
-    except InputError as error:
-        raise InputError(str(error), path=path) from error

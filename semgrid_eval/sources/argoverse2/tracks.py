@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import SE3
-from semgrid_eval.recording.types import Actor, Pose
+from semgrid_eval.recording.types import LONGEST_ACTOR_M, Actor, Pose
 from semgrid_eval.sources.argoverse2.categories import LABEL_BY_CATEGORY, NOTHING_SEEN
 from semgrid_eval.sources.argoverse2.tables import Table, read_table
 from semgrid_eval.sources.poses import planar
@@ -23,7 +23,6 @@ _BOXES = {
     **POSE,
     "num_interior_pts": "int64",
 }
-_LONGEST_M = 200.0
 _NEIGHBOUR_NS = 300_000_000
 """A track's boxes that are farther apart than three frames say nothing of its velocity."""
 Floats = NDArray[np.float64]
@@ -35,8 +34,8 @@ def read_boxes(path: Path) -> Table:
     if not len(table["timestamp_ns"]):
         raise InputError("holds no box", path=path)
     for name in _SIZES:
-        if len(wrong := np.flatnonzero(~((table[name] > 0) & (table[name] <= _LONGEST_M)))):
-            fault = f"row {wrong[0]}: {table[name][wrong[0]]:g} m is not within 0 to {_LONGEST_M:g} m"
+        if len(wrong := np.flatnonzero(~((table[name] > 0) & (table[name] <= LONGEST_ACTOR_M)))):
+            fault = f"row {wrong[0]}: {table[name][wrong[0]]:g} m is not within 0 to {LONGEST_ACTOR_M:g} m"
             raise InputError(fault, path=path, field=name)
     for row, category in enumerate(table["category"].tolist()):
         if category not in LABEL_BY_CATEGORY:

@@ -8,18 +8,15 @@ SRC/sequences/<NN>/labels/000000.label  SemanticKITTI's, where present
 SRC/sequences/<NN>/image_2, image_3     rectified colour images, where both are present
 """
 
-import math
 import re
 from collections.abc import Iterator
-from functools import partial
-from itertools import pairwise
 from pathlib import Path
-from typing import NoReturn
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.sources.kitti.sequence import KittiSequence, Part, camera0_at
 from semgrid_eval.sources.kitti.source import KittiOptions
+from semgrid_eval.sources.parts import count_of_parts, equal_parts
 
 _LEAST_FRAMES = 2
 _NUMBER = re.compile(r"[0-9]{6}")
@@ -37,18 +34,13 @@ def convert_kitti(options: KittiOptions, out: Path, work: Work = IN_PROCESS) -> 
             sequence = _sequence(folder, options)
             parts = list(_parts(sequence, options))
         except InputError as error:
-            refuse = partial(_refuse, str(error))
-            jobs.append(ConversionJob(folder.name, options.split, refuse, refuse))
+            jobs.append(ConversionJob.failing(folder.name, options.split, str(error)))
             continue
         sequences.append(sequence)
         jobs += [ConversionJob(each.name, each.split, each.digest, each.recording) for each in parts]
     summary = convert_jobs(jobs, out, work)
     summary.remark = _remark(sequences)
     return summary
-
-
-def _refuse(fault: str) -> NoReturn:
-    raise InputError(fault)
 
 
 def _folders(options: KittiOptions) -> list[Path]:
@@ -90,9 +82,7 @@ def _parts(sequence: KittiSequence, options: KittiOptions) -> Iterator[Part]:
         raise InputError("has a single frame; motion needs more", path=sequence.folder)
     span_ns = sequence.stamps_ns[end - 1] - sequence.stamps_ns[first]
     most = (end - first) // _LEAST_FRAMES
-    count = min(most, max(1, math.ceil(span_ns / (options.recording_s * 1e9)))) if options.recording_s else 1
-    bounds = [first + (end - first) * part // count for part in range(count + 1)]
-    for start, stop in pairwise(bounds):
+    for start, stop in equal_parts(first, end, min(most, count_of_parts(span_ns, options.recording_s))):
         yield Part(sequence, start, stop, options.split)
 
 

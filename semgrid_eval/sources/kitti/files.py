@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import InputError, located
 from semgrid_eval.files import read_bytes
 from semgrid_eval.geometry import SE3
 from semgrid_eval.recording.lidar import MAX_POINTS
@@ -77,10 +77,8 @@ def read_labels(path: Path) -> NDArray[np.uint8]:
     if len(data) % _LABEL_BYTES:
         raise InputError(f"has {len(data)} bytes, which are not labels of {_LABEL_BYTES} bytes", path=path)
     classes = (np.frombuffer(data, "<u4") & 0xFFFF).astype(np.uint16)
-    try:
+    with located(path=path):
         return label_ids(classes)
-    except InputError as error:
-        raise InputError(str(error), path=path) from error
 
 
 def read_file(path: Path) -> bytes:

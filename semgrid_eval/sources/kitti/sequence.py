@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import InputError, located
 from semgrid_eval.files import digest_files, digest_value
 from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
 from semgrid_eval.recording.lidar import LidarSweep, Mount
@@ -92,6 +92,10 @@ class Part:
 
     def digest(self) -> str:
         """Digest the bytes of all files and the options."""
+        return self._digest
+
+    @cached_property
+    def _digest(self) -> str:
         sequence = self.sequence
         of_frames = [
             sequence.file(channel, number) for number in range(self.first, self.end) for channel in sequence.channels
@@ -113,7 +117,7 @@ class Part:
             split=self.split,
             group=sequence.folder.name,
             calibrations=self._cameras(),
-            source_digest=self.digest(),
+            source_digest=self._digest,
             moments=self._moments,
             source_files={"calib.txt": files.read_file(sequence.folder / "calib.txt")},
         )
@@ -148,7 +152,5 @@ class Part:
         if camera_from_lidar is None:
             raise InputError("is missing", path=sequence.folder / "calib.txt", field="Tr")
         mount = Mount.of(sequence.ego_from_camera0 @ camera_from_lidar)
-        try:
+        with located(path=scan):
             return LidarSweep(sequence.stamps_ns[number], mount, points[:, :3], points[:, 3], labels)
-        except InputError as error:
-            raise InputError(str(error), path=scan) from error

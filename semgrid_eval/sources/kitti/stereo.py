@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import InputError, located
 from semgrid_eval.geometry import SE3
 from semgrid_eval.recording.colour import decode_colour
 from semgrid_eval.recording.disparity import coded_disparity
@@ -31,10 +31,8 @@ def calibration_of(given: Calibration, ego_from_camera0: SE3, path: Path) -> Cam
         raise InputError("is not a projection", path=path, field="P2, P3") from error
     x_m, y_m, z_m = ego_from_camera0.apply(np.asarray(camera_m, np.float64)).tolist()
     baseline_m = float(right_m[0] - camera_m[0])
-    try:
+    with located(path=path):
         return CameraCalibration(fx_px, fy_px, u0_px, v0_px, baseline_m, x_m, y_m, z_m, 0.0, 0.0, 0.0)
-    except InputError as error:
-        raise InputError(str(error), path=path) from error
 
 
 class StereoPairs:

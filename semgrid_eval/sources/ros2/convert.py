@@ -4,9 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import NoReturn
 
-from semgrid_eval.errors import InputError
 from semgrid_eval.executors import WorkerDied, local_executor
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
 from semgrid_eval.recording.disparity import CODING_ERROR_PX, LARGEST_PX
@@ -52,13 +50,8 @@ def _plans(bags: Sequence[Path], mapping: BagMap, cut: Cut, work: Work) -> list[
 
 def _jobs(plan: BagPlan, split: str) -> list[ConversionJob]:
     if plan.fault:
-        refuse = partial(_refuse, plan.fault)
-        return [ConversionJob(plan.name, split, refuse, refuse)]
+        return [ConversionJob.failing(plan.name, split, plan.fault)]
     return [ConversionJob(each.name, split, each.digest, each.recording) for each in plan.stretches]
-
-
-def _refuse(fault: str) -> NoReturn:
-    raise InputError(fault)
 
 
 def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.motion import EXTRAPOLATION_LIMIT_S
+from semgrid_eval.sources.parts import count_of_parts, equal_parts
 from semgrid_eval.sources.ros2.arrivals import Arrivals
 from semgrid_eval.sources.ros2.mapping import CameraMap
 
@@ -119,7 +120,7 @@ def _spans(stamps_ns: Stamps, cuts_ns: Iterable[int], longest_s: float) -> Itera
     if len(stamps_ns):
         ends_ns = (int(stamps_ns[0]), *sorted(cuts_ns), int(stamps_ns[-1]) + 1)
         for start_ns, end_ns in pairwise(ends_ns):
-            yield from _parts(start_ns, end_ns, longest_s)
+            yield from equal_parts(start_ns, end_ns, count_of_parts(end_ns - start_ns, longest_s))
 
 
 def _order(frame: FramePlan) -> tuple[int, str]:
@@ -132,10 +133,3 @@ def _holes(stamps_ns: Stamps) -> list[int]:
     if not len(steps_ns):
         return []
     return [int(each) for each in stamps_ns[1:][steps_ns > _HOLE_PERIODS * np.median(steps_ns)]]
-
-
-def _parts(start_ns: int, end_ns: int, longest_s: float) -> list[tuple[int, int]]:
-    """Cut a span into equal parts that are no longer than asked for; 0 leaves it whole."""
-    count = max(1, -int(-(end_ns - start_ns) // (longest_s * _NS_PER_S))) if longest_s else 1
-    bounds = [start_ns + (end_ns - start_ns) * part // count for part in range(count + 1)]
-    return list(pairwise(bounds))

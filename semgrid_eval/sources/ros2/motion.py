@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.geometry import yaw_of
 from semgrid_eval.recording.types import MotionSample
 from semgrid_eval.sources.poses import speeds_mps, yaw_rates_radps
 from semgrid_eval.sources.ros2.kinds import IMU, ODOMETRY
@@ -53,8 +54,7 @@ def values_of(message: Any, kind: str, by: str) -> tuple[float, ...]:  # noqa: A
         return rate.x, rate.y, rate.z
     if by == "pose":
         pose = message.pose.pose
-        turn = rotation_of(pose.orientation)
-        return pose.position.x, pose.position.y, float(np.arctan2(turn[1, 0], turn[0, 0]))
+        return pose.position.x, pose.position.y, yaw_of(rotation_of(pose.orientation))
     twist = message.twist.twist if kind == ODOMETRY else message.twist
     return twist.linear.x, twist.angular.z
 

@@ -8,7 +8,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import InputError, located
 from semgrid_eval.files import digest_value
 from semgrid_eval.recording.types import CameraFrame, Moment, MotionSample, Recording
 from semgrid_eval.sources.ros2.bag import Arrival, Bag
@@ -73,10 +73,8 @@ def _until(stamp_ns: int, coming: deque[MotionSample]) -> Iterator[MotionSample]
 
 
 def _made(stretch: Stretch, rig: Rig, plan: FramePlan, messages: dict[str, Any]) -> CameraFrame:
-    try:
+    with located(path=stretch.bag, field=f"{plan.camera} at {plan.stamp_ns} ns"):
         return rig.frame(plan.stamp_ns, messages)
-    except InputError as error:
-        raise InputError(str(error), path=stretch.bag, field=f"{plan.camera} at {plan.stamp_ns} ns") from error
 
 
 def _gathered(stretch: Stretch) -> Iterator[tuple[FramePlan, dict[str, Any]]]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import InputError, located
 from semgrid_eval.recording.disparity import LARGEST_PX, coded_disparity
 from semgrid_eval.recording.png import encode, encode_gray
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame
@@ -51,11 +51,9 @@ def plan_rig(camera: CameraMap, vehicle: VehicleMap, facts: Facts) -> RigPlan:
         _require_size(
             facts, topic, right_info or info if is_right else info, camera.right_info if is_right else camera.info
         )
-    try:
+    with located(field=camera.info):
         projection = info.projection(rectified=camera.rectified)
         baseline = _baseline(camera, facts, projection, right_info)
-    except InputError as error:
-        raise InputError(str(error), field=camera.info) from error
     calibration = calibration_of(projection, baseline, _place(camera, vehicle, facts))
     if camera.disparity is not None:
         _require_agreement(facts, camera.disparity, calibration)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from hashlib import blake2b
 from typing import Any, NamedTuple
 
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import InputError, located
 from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.arrivals import Arrivals, Ledger
 from semgrid_eval.sources.ros2.bag import Arrival, Bag
@@ -88,10 +88,8 @@ class _Scanner:
 
     def take(self, arrival: Arrival) -> None:
         message = self._bag.decode(arrival, self._facts.kinds[arrival.topic])
-        try:
+        with located(path=self._bag.path):
             self._take(arrival, message)
-        except InputError as error:
-            raise InputError(str(error), path=self._bag.path) from error
 
     def close(self) -> Facts:
         for topic, names in self._uses.items():
@@ -99,10 +97,8 @@ class _Scanner:
                 raise InputError("has no message", path=self._bag.path, field=topic)
             if set(names) <= {"info", "right_info", "tf"}:
                 continue
-            try:
+            with located(path=self._bag.path):
                 self._facts.arrivals[topic] = self._ledgers.get(topic, Ledger(topic)).close()
-            except InputError as error:
-                raise InputError(str(error), path=self._bag.path) from error
         return self._facts
 
     def _take(self, arrival: Arrival, message: Any) -> None:  # noqa: ANN401 - a class that rosbags makes
@@ -136,11 +132,9 @@ class _Scanner:
         track.values.append(values_of(message, self._facts.kinds[topic], by))
 
     def _picture(self, topic: str, name: str, stamp_ns: int, message: Any) -> None:  # noqa: ANN401
-        try:
+        with located(field=f"{topic} at {stamp_ns} ns"):
             shape = shape_of(message.image if name == "disparity" else message)
             require_coding(name, shape.coding)
-        except InputError as error:
-            raise InputError(str(error), field=f"{topic} at {stamp_ns} ns") from error
         first = self._facts.shapes.setdefault(topic, shape)
         if shape != first:
             raise InputError(f"begins as {first} and is {shape} at {stamp_ns} ns", field=topic)

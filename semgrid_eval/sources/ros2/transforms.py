@@ -89,7 +89,7 @@ def extrinsics_of(vehicle_from_optical: SE3) -> Extrinsics:
         z_m=float(z_m),
         roll_rad=float(np.arctan2(turn[2, 1], turn[2, 2])),
         pitch_rad=float(-np.arcsin(np.clip(turn[2, 0], -1.0, 1.0))),
-        yaw_rad=float(np.arctan2(turn[1, 0], turn[0, 0])),
+        yaw_rad=geometry.yaw_of(turn),
     )
 
 
