@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 from support.cityscapes_tree import Tree
+from support.commands import run_command
 from support.onnx_models import colour_network
 from support.pages import blocks, commands, text_of
 from support.toy_world import street
 
-from semgrid_eval.cli.main import main
 from semgrid_eval.log.store import write_log
 
 TOWN = (
@@ -37,12 +37,6 @@ def workplace(tmp_path, monkeypatch):
     return tmp_path
 
 
-def exit_code(words):
-    with pytest.raises(SystemExit) as ended:
-        main(words)
-    return ended.value.code
-
-
 def run(page):
     """Run a page's commands, but for what installs."""
     for line in commands(text_of(page)):
@@ -51,7 +45,8 @@ def run(page):
         line = line.removeprefix("semgrid-eval ")
         less = next((options for start, options in LESS.items() if line.startswith(start)), "")
         words = [part for word in shlex.split(line) for part in (sorted(map(str, Path().glob(word))) or [word])]
-        assert exit_code(words + shlex.split(less)) == FINDINGS.get(line, 0), line
+        ended = run_command(words + shlex.split(less))
+        assert ended.code == FINDINGS.get(line, 0), f"{line}\n{ended.err}"
 
 
 def toy_logs(folder):
@@ -94,7 +89,7 @@ def test_own_model(workplace):
 
 def test_report_and_playback(workplace):
     toy_logs("logs")
-    assert exit_code(["run", "baselines", "--logs", "logs", "--out", "runs/first"]) == 0
+    assert run_command(["run", "baselines", "--logs", "logs", "--out", "runs/first"]).code == 0
     run("docs/report.md")
     named = set(re.findall(r"^\| `([^`]+)`", text_of("docs/report.md"), re.MULTILINE))
     assert named <= {path.name + "/" * path.is_dir() for path in Path("runs/first/report").iterdir()}

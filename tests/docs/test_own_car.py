@@ -5,23 +5,22 @@ import shlex
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from support.bags import RecordingBag, Variant
+from support.commands import run_command
 from support.onnx_models import colour_network
+from support.pages import blocks, commands, text_of
 from support.toy_world import street
 
 from semgrid_eval.classes import CITYSCAPES_LABELS
-from semgrid_eval.cli.main import cli
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.scores.results import read_run
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.sources.ros2.mapping import load_map
 
-PAGE = (Path(__file__).parents[2] / "docs" / "own-car.md").read_text(encoding="utf-8")
-YAML = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
-LINES = [line for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL) for line in block.splitlines()]
-COMMANDS = [line for line in LINES if line.startswith("semgrid-eval ")]
+PAGE = text_of("docs/own-car.md")
+YAML = blocks("yaml", PAGE)
+COMMANDS = [line for line in commands(PAGE) if line.startswith("semgrid-eval ")]
 
 
 def labelling_network(path):
@@ -48,9 +47,9 @@ def workplace(tmp_path, monkeypatch):
 def run(line):
     program, *arguments = shlex.split(line)
     assert program == "semgrid-eval"
-    result = CliRunner().invoke(cli, arguments, standalone_mode=False)
-    assert result.return_value in (0, None), f"{line}\n{result.output}\n{result.exception}"
-    return result.output
+    ended = run_command(arguments)
+    assert ended.code == 0, f"{line}\n{ended.err}"
+    return ended.out + ended.err
 
 
 @pytest.mark.slow

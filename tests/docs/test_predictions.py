@@ -1,33 +1,33 @@
 """The worked example of docs/predictions.md runs, and its rows score what it writes."""
 
-import re
 import runpy
 import sys
 from pathlib import Path
 
 import numpy as np
 import yaml
+from support.pages import blocks, text_of
 from support.small_runs import run
 from support.toy_world import street
 
 from semgrid_eval.log.store import write_log
 from semgrid_eval.scores import results
 
-PAGE = (Path(__file__).parents[2] / "docs" / "predictions.md").read_text(encoding="utf-8")
+PAGE = text_of("docs/predictions.md")
 
 
 def test_the_example_writes_logs_that_its_rows_score(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_log(street(1, frames=27, speed_mps=12.0).recording("toy", "train"), Path("logs/train/toy.mcap"))
     write_log(street(2, frames=27, speed_mps=12.0).recording("drive", "val"), Path("logs/val/drive.mcap"))
-    node, export = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    node, export = blocks("python", PAGE)
     Path("node.py").write_text(node)
     for folder in ("predictions", "runs"):
         Path(folder).mkdir()
     monkeypatch.setattr(sys, "argv", ["node.py", "logs", "predictions"])
     runpy.run_path("node.py")
     assert sorted(path.name for path in Path("predictions").iterdir()) == ["drive.mcap", "toy.mcap"]
-    rows = yaml.safe_load(re.search(r"```yaml\n(.*?)```", PAGE, re.DOTALL)[1])["rows"]
+    rows = yaml.safe_load(blocks("yaml", PAGE)[0])["rows"]
     rows += [{"name": "BL-DC", "model": "newest"}, {"name": "BL-NT", "model": "newest", "translate": False}]
     window = {"step_frames": 5, "target_frame": 25}
     record = run(rows, Path("logs"), tmp_path / "runs" / "first", window=window)

@@ -1,20 +1,20 @@
 """A bad input, and what becomes of the command that reads it."""
 
 import atexit
-import io
 import os
 import re
 import shlex
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
-from contextlib import chdir, redirect_stderr, redirect_stdout
+from contextlib import chdir
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from semgrid_eval.cli.main import main
+from support.commands import run_command
+
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.files import digest_files
 
@@ -85,15 +85,9 @@ def run(command: str) -> tuple[int, list[str]]:
 
     Returns its exit code, and the lines on stderr after the first error that a check found.
     """
-    err, code = io.StringIO(), 0
-    out = io.StringIO()
-    with redirect_stdout(out), redirect_stderr(err):
-        try:
-            main(shlex.split(command))
-        except SystemExit as left:
-            code = int(left.code or 0)
-    findings = [f"Error: {line}" for line in out.getvalue().splitlines() if re.search(_FINDING, line)]
-    return code, [*findings[:1], *err.getvalue().splitlines()]
+    code, out, err = run_command(shlex.split(command))
+    findings = [f"Error: {line}" for line in out.splitlines() if re.search(_FINDING, line)]
+    return code, [*findings[:1], *err.splitlines()]
 
 
 @cache
