@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from support import fuzzing
-from support.fuzzing import Kind
+from support.fuzzing_ways import Kind
 
 from semgrid_eval.errors import SemgridError
 

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 from support.damage import CHUNK, flipped, stretches
-from support.fuzzing import KINDS, Kind, anyhow, corpus, words
+from support.fuzzing import KINDS
+from support.fuzzing_texts import corpus
+from support.fuzzing_ways import Kind, anyhow, words
 from support.mutations import KINDS as KEPT
 
 from semgrid_eval.errors import InputError
