@@ -7,19 +7,18 @@ from typing import TYPE_CHECKING
 import click
 
 from semgrid_eval.cli.console import loudness_options, say
-from semgrid_eval.cli.options import FOLDER
+from semgrid_eval.cli.options import FOLDER, FOLDER_THERE
 from semgrid_eval.cli.types import Number
 
 if TYPE_CHECKING:
     from semgrid_eval.runs.caches import Kept
 
-_FOLDERS = click.Path(path_type=Path, exists=True, file_okay=False)
 _RUN = "Keep what this run uses; may be repeated."
 _DAYS = "Keep what was used within so many days."
 
 
 @click.command("cache", epilog="Example: semgrid-eval cache runs/first logs")
-@click.argument("folders", metavar="FOLDER...", nargs=-1, required=True, type=_FOLDERS)
+@click.argument("folders", metavar="FOLDER...", nargs=-1, required=True, type=FOLDER_THERE)
 @click.option("--list/--clean", "listed", default=True, help="List what is kept, or remove what nobody uses.")
 @click.option("--run", "runs", multiple=True, type=FOLDER, help=_RUN)
 @click.option("--older-than", "days", type=Number(0), metavar="DAYS", help=_DAYS)

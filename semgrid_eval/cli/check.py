@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from semgrid_eval.cli.console import loudness_options, progress, say
-from semgrid_eval.cli.options import FOLDER, logs_argument
+from semgrid_eval.cli.options import FILE_THERE, FOLDER, logs_argument
 from semgrid_eval.errors import printable
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 _UNREADABLE = 3
 _FORMAT_VERSION = 1
-_FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 
 
 def _print_spec(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -31,7 +30,7 @@ def _print_spec(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
 
 @click.command("check", params=[logs_argument()], epilog="Example: semgrid-eval check logs")
 @click.option("--recover", metavar="OUT", type=FOLDER, help="Save what is whole of every LOG in this folder.")
-@click.option("--spec", metavar="FILE", type=_FILE, help="What is expected of the recordings (YAML).")
+@click.option("--spec", metavar="FILE", type=FILE_THERE, help="What is expected of the recordings (YAML).")
 @click.option(
     "--print-spec",
     is_flag=True,

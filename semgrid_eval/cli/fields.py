@@ -8,9 +8,8 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 import click
 from pydantic.fields import FieldInfo
 
+from semgrid_eval.cli.options import THERE
 from semgrid_eval.config import Config
-
-_THERE = click.Path(path_type=Path, exists=True)
 
 
 def parameters_of(config: type[Config]) -> Iterator[click.Parameter]:
@@ -22,9 +21,9 @@ def parameters_of(config: type[Config]) -> Iterator[click.Parameter]:
     for name, field in config.model_fields.items():
         kind = _plain(field.annotation)
         if kind is Path and field.is_required():
-            yield click.Argument([name], type=_THERE)
+            yield click.Argument([name], type=THERE)
         elif kind == tuple[Path, ...] and field.is_required():
-            yield click.Argument([name], type=_THERE, nargs=-1, required=True)
+            yield click.Argument([name], type=THERE, nargs=-1, required=True)
         else:
             yield click.Option([f"--{name.replace('_', '-')}", name], **_settings(kind, field))
 
@@ -45,7 +44,7 @@ def _settings(kind: Any, field: FieldInfo) -> dict[str, Any]:  # noqa: ANN401 - 
 def _value_type(kind: Any) -> Any:  # noqa: ANN401 - types
     if get_origin(kind) is Literal:
         return click.Choice(get_args(kind))
-    return _THERE if kind is Path else kind
+    return THERE if kind is Path else kind
 
 
 def _plain(annotation: Any) -> Any:  # noqa: ANN401 - a type annotation

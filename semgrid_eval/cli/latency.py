@@ -8,7 +8,7 @@ import click
 
 from semgrid_eval.cli.console import command_line, loudness_options, progress, say
 from semgrid_eval.cli.fields import parameters_of
-from semgrid_eval.cli.options import FOLDER, device_option, logs_argument
+from semgrid_eval.cli.options import FILE_THERE, FOLDER, device_option, logs_argument
 from semgrid_eval.cli.types import Whole
 from semgrid_eval.config import parse_config
 from semgrid_eval.segmentation.config import SegmentationConfig
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from semgrid_eval.streams.profile import LatencyProfile
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
-_ONNX = click.Path(path_type=Path, exists=True, dir_okay=False)
 _MODEL = "One of `run`'s models, or path.py:Class; may be given several times."
 _SEGMENT = "ONNX file of a segmentation network that makes the labels; the next options are its own."
 _RIGHT = "Folder of right images, FOLDER/<recording>/*.png in the order of frames; disparity is matched then."
@@ -30,7 +29,7 @@ _SHOWN = ("processor", "cores", "threads", "device", "gpu", "clock")
     params=[
         logs_argument(),
         click.Option(["--model", "models"], multiple=True, help=_MODEL),
-        click.Option(["--segment"], type=_ONNX, help=_SEGMENT),
+        click.Option(["--segment"], type=FILE_THERE, help=_SEGMENT),
         *parameters_of(SegmentationConfig),
         click.Option(["--right"], type=FOLDER, help=_RIGHT),
         click.Option(["--frames"], type=Whole(1, 100_000), default=300, show_default=True, help="At most."),

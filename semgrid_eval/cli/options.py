@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
 THERE = click.Path(path_type=Path, exists=True)
+FILE_THERE = click.Path(path_type=Path, exists=True, dir_okay=False)
+FOLDER_THERE = click.Path(path_type=Path, exists=True, file_okay=False)
 WORKERS = Whole(1, 256)
 
 

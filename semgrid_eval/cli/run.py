@@ -9,6 +9,7 @@ import click
 from semgrid_eval.cli.console import command_line, complain, loudness_options, progress, say
 from semgrid_eval.cli.options import (
     FOLDER,
+    FOLDER_THERE,
     THERE,
     chosen_executor,
     device_option,
@@ -35,7 +36,7 @@ _MODEL = "One more row: a model of your own, path.py:Class, or an installed one.
 @click.option("--out", required=True, type=FOLDER, help="Folder of the run.")
 @click.option("--grids", type=FOLDER, help="Grid cache (default: OUT/grids).")
 @click.option("--validation-logs", type=THERE, help="Folder of the logs to score, where they are not in --logs.")
-@click.option("--trainings", type=click.Path(path_type=Path, file_okay=False, exists=True), help=_TRAININGS)
+@click.option("--trainings", type=FOLDER_THERE, help=_TRAININGS)
 @click.option("--model", "models", multiple=True, help=_MODEL)
 @click.option("--row", "only", multiple=True, help="Only this row, or rows like 'BL-*'; may be repeated.")
 @device_option

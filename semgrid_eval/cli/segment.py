@@ -8,11 +8,10 @@ import click
 from semgrid_eval.cli.console import loudness_options, progress
 from semgrid_eval.cli.converted import show
 from semgrid_eval.cli.fields import parameters_of
-from semgrid_eval.cli.options import FOLDER, WORKERS, logs_argument
+from semgrid_eval.cli.options import FILE_THERE, FOLDER, WORKERS, logs_argument
 from semgrid_eval.config import parse_config
 from semgrid_eval.segmentation.config import SegmentationConfig
 
-_MODEL = click.Path(path_type=Path, exists=True, dir_okay=False)
 _SHARED = "Logs at once; they share the cores, all of which one log can use."
 
 
@@ -20,7 +19,7 @@ _SHARED = "Logs at once; they share the cores, all of which one log can use."
     "segment",
     params=[
         logs_argument(),
-        click.Option(["--model"], required=True, type=_MODEL, help="The ONNX file."),
+        click.Option(["--model"], required=True, type=FILE_THERE, help="The ONNX file."),
         click.Option(["--out"], required=True, type=FOLDER, help="Folder of the new logs."),
         *parameters_of(SegmentationConfig),
         click.Option(["--workers"], type=WORKERS, default=1, show_default=True, help=_SHARED),
