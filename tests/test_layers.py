@@ -30,7 +30,7 @@ FLOORS = [
     "cli",
 ]
 ALLOWED_IN = {
-    "mcap": {"log", "playback"},
+    "mcap": {"log", "playback", "bench"},  # whose reader is a rival
     "google": {"log", "playback"},
     "foxglove_schemas_protobuf": {"log", "playback"},
     "onnxruntime": {"segmentation"},

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from semgrid_eval.bench.measurement import Measurement
-from semgrid_eval.bench.networks import GIVEN, flops_of_an_update, random_windows
+from semgrid_eval.bench.networks import GIVEN, Subject, flops_of_an_update, random_windows
 from semgrid_eval.errors import first_line
 from semgrid_eval.executors import Processes, WorkerDied
 from semgrid_eval.models.device import settle_process, visible_gpus
@@ -86,7 +86,7 @@ def measure_gpu(size: Size, device: torch.device) -> Iterator[Measurement | str]
     rate = product_rate(size, device)
     yield Measurement(f"product of bf16 matrices, {size.matrix_rows} rows", rate / 1e12, "Tflop/s")
     yield Measurement("trained by the package", package_rate(size, device), "windows/s")
-    seconds_at_best = flops_of_an_update(_settings(size), 1) / rate
+    seconds_at_best = flops_of_an_update(Subject("ED", _settings(size)), 1) / rate
     graphs = device.type == "cuda"
     first, later = ([way for way in ways if graphs or not (way.graph or way.compiled)] for ways in (WAYS, LATER_WAYS))
     answers = [way for way in ANSWERS if graphs or not way.graph]

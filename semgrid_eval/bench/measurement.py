@@ -20,10 +20,12 @@ class Settings:
     updates: int = 4  # in each repeat
     windows: int = 64  # that are predicted and scored in each repeat
     matrix_rows: int = 2048  # of the square matrices whose product tells the machine's rate
+    recordings: int = 16  # whose conversion and grids are shared by `workers`
+    workers: int = 2  # processes at once
 
 
 FULL = Settings()
-QUICK = Settings(repeats=1, features=(16,), updates=3, windows=32)
+QUICK = Settings(repeats=1, features=(16,), updates=3, windows=32, recordings=4)
 
 
 @dataclass(frozen=True)
@@ -32,31 +34,59 @@ class Measurement:
 
     what: str  # was measured, in a few words
     value: float  # the median
-    unit: str  # of the value; `s CPU` is processor time, that of SUMO's tools included
-    at_most: float | None = None  # what is promised, None where nothing is
+    unit: str  # of the value; `s CPU` is processor time, that of started processes included
+    at_most: float | None = None  # the goal, None where it is not an upper bound
+    at_least: float | None = None  # the goal, None where it is not a lower bound
 
     @property
-    def kept(self) -> bool | None:
-        """Whether the promise is kept; None without one."""
-        return None if self.at_most is None else self.value <= self.at_most
+    def goal(self) -> str:
+        """What was to be reached, in words; empty where nothing was."""
+        if self.at_most is not None:
+            return f"at most {self.at_most:g}"
+        return "" if self.at_least is None else f"at least {self.at_least:g}"
+
+    @property
+    def is_short(self) -> bool:
+        """Whether there is a goal and it is not reached."""
+        above = self.at_most is not None and self.value > self.at_most
+        return above or (self.at_least is not None and self.value < self.at_least)
+
+
+def processor_clock_s() -> float:
+    """Return the processor time of this process so far, that of processes which it has waited for included."""
+    waited_for = os.times()
+    return time.process_time() + waited_for.children_user + waited_for.children_system
+
+
+seconds_passed = time.perf_counter
+"""The clock that a user waits by."""
 
 
 def wall_s(work: Callable[[], object], repeats: int) -> float:
     """Return the median time that passes while `work` is done."""
-    return median(_elapsed(time.perf_counter, work) for _ in range(repeats))
+    return median(_elapsed(seconds_passed, work) for _ in range(repeats))
 
 
 def processor_s(work: Callable[[], object], repeats: int) -> float:
     """Return the median processor time of `work`, that of processes which it starts and waits for included."""
-    return median(_elapsed(_processor_clock_s, work) for _ in range(repeats))
+    return median(_elapsed(processor_clock_s, work) for _ in range(repeats))
+
+
+def times_as_fast(
+    ours: Callable[[], object],
+    rival: Callable[[], object],
+    repeats: int,
+    *,
+    clock: Callable[[], float] = processor_clock_s,
+) -> float:
+    """Return how many times as long the rival takes: both in turn, the median of the pairs.
+
+    Whatever else the machine does meets both alike. `clock` gives seconds.
+    """
+    return median(_elapsed(clock, rival) / _elapsed(clock, ours) for _ in range(repeats))
 
 
 def _elapsed(clock: Callable[[], float], work: Callable[[], object]) -> float:
     start_s = clock()
     work()
     return clock() - start_s
-
-
-def _processor_clock_s() -> float:
-    spent = os.times()
-    return spent.user + spent.system + spent.children_user + spent.children_system

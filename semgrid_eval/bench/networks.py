@@ -4,7 +4,8 @@ import math
 import tempfile
 import time
 from collections.abc import Iterator
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from statistics import median
 
@@ -14,18 +15,20 @@ from torch import Tensor
 from torch.nn import functional as F
 from torch.utils.flop_counter import FlopCounterMode
 
-from semgrid_eval.bench.measurement import Measurement, Settings, wall_s
+from semgrid_eval.bench.cells import measure_scoring
+from semgrid_eval.bench.measurement import Measurement, Settings, seconds_passed, times_as_fast, wall_s
 from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config
 from semgrid_eval.grids.recording import GridRecording
 from semgrid_eval.models.device import Precision, choose_precision, settle_process
 from semgrid_eval.models.encoder_decoder import EncoderDecoder, EncoderDecoderSettings
 from semgrid_eval.models.model import Given
-from semgrid_eval.models.network import TrainingConfig, masked_loss, seeded_network
+from semgrid_eval.models.network import Network, NetworkSettings, masked_loss, seeded_network
 from semgrid_eval.models.newest import RepeatNewest
+from semgrid_eval.models.residual import Residual, ResidualSettings
 from semgrid_eval.models.training import train
 from semgrid_eval.scores.evaluate import evaluate
-from semgrid_eval.windows.data import WindowSet, select_windows
+from semgrid_eval.windows.data import WindowBatch, WindowSet, select_windows
 from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import WindowConfig, training_windows
 
@@ -35,57 +38,100 @@ GIVEN = Given(("full",), WindowConfig().inputs, _CELLS, _CELLS, _CELL_M, transla
 """What a row of random windows gives its model."""
 
 
+@dataclass(frozen=True)
+class Subject:
+    """A network that is measured."""
+
+    name: str
+    settings: NetworkSettings
+    kind: type[Network] = EncoderDecoder
+
+    def network(self, **training: object) -> Network:
+        """Make it untrained, with some settings of its training changed."""
+        changed = {"training": self.settings.training.model_copy(update=training)}
+        return seeded_network(self.kind, self.settings.model_copy(update=changed), GIVEN, seed=0)
+
+
+RESIDUAL = Subject("RN", ResidualSettings(), Residual)
+
+
+def encoder_decoder(features: int) -> Subject:
+    """Return the encoder-decoder of a width."""
+    return Subject(f"f {features}", EncoderDecoderSettings(features=features))
+
+
 def measure_training(settings: Settings, device: torch.device) -> Iterator[Measurement]:
-    """Train networks of different width: windows a second, ours and a textbook's.
+    """Train networks: windows a second, against a textbook's and against the product of matrices.
 
     All of the textbook's come first, because ours are measured in a process that keeps its memory.
     """
-    textbook = {f: _textbook_rate(EncoderDecoderSettings(features=f), settings, device) for f in settings.features}
+    subjects = [encoder_decoder(features) for features in settings.features]
+    textbook = {each.name: _textbook_rate(each.settings, settings, device) for each in subjects}
     settle_process()
     dtype = choose_precision("auto", device)
     name = str(dtype).removeprefix("torch.")
     matrix_rate = _matrix_rate(settings, device, dtype)
     yield Measurement(f"product of {name} matrices", matrix_rate / 1e9, "Gflop/s")
-    for features, slow in textbook.items():
-        config = EncoderDecoderSettings(features=features)
-        rate = _training_rate(config, settings, device)
-        share = rate * flops_of_an_update(config, settings.batch) / settings.batch / matrix_rate
-        yield Measurement(f"f {features}, batch {settings.batch}, {name}", rate, "windows/s")
+    for subject in (*subjects, RESIDUAL):
+        rate = _training_rate(subject, settings, device)
+        share = rate * flops_of_an_update(subject, settings.batch) / settings.batch / matrix_rate
+        yield Measurement(f"{subject.name}, batch {settings.batch}, {name}", rate, "windows/s")
         if dtype is not torch.float32:
-            plain = _training_rate(config, settings, device, precision="float32")
-            yield Measurement(f"f {features}, batch {settings.batch}, float32", plain, "windows/s")
-        yield Measurement(f"f {features}, batch {settings.batch}, textbook", slow, "windows/s")
-        yield Measurement(f"f {features}, against the textbook", rate / slow, "times")
-        yield Measurement(f"f {features}, against the product of matrices", 100.0 * share, "%")
+            plain = _training_rate(subject, settings, device, precision="float32")
+            yield Measurement(f"{subject.name}, batch {settings.batch}, float32", plain, "windows/s")
+        if slow := textbook.get(subject.name):
+            yield Measurement(f"{subject.name}, batch {settings.batch}, textbook", slow, "windows/s")
+            yield Measurement(f"{subject.name}, against the textbook", rate / slow, "times")
+        at_least = 60.0 if subject is RESIDUAL else None
+        yield Measurement(f"{subject.name}, against the product of matrices", 100.0 * share, "%", at_least=at_least)
 
 
 def measure_prediction(settings: Settings, device: torch.device) -> Iterator[Measurement]:
-    """Predict windows with networks, and score them."""
+    """Predict windows with networks, many and one at a time, and score them."""
     windows = random_windows(settings.windows).to(device)
-    for features in settings.features:
-        config = EncoderDecoderSettings(features=features)
-        network = seeded_network(EncoderDecoder, config, GIVEN, seed=0).to(device).eval()
+    subjects = [encoder_decoder(features) for features in settings.features]
+    for subject in (*subjects, RESIDUAL):
+        network = subject.network().to(device).eval()
         evaluate(network, windows)
         took_s = median(evaluate(network, windows).seconds for _ in range(settings.repeats))
-        yield Measurement(f"predicted, f {features}", len(windows) / took_s, "windows/s")
+        yield Measurement(f"predicted, {subject.name}", len(windows) / took_s, "windows/s")
+    yield from _measure_answers(subjects[-1], windows.batch(slice(1)), settings)
     newest = RepeatNewest(Config(), GIVEN)
     took_s = wall_s(lambda: evaluate(newest, windows), settings.repeats)
     yield Measurement("predicted by BL-DC and scored", len(windows) / took_s, "windows/s")
+    yield from measure_scoring(settings)
 
 
-def _textbook_rate(config: EncoderDecoderSettings, settings: Settings, device: torch.device) -> float:
+def _measure_answers(largest: Subject, window: WindowBatch, settings: Settings) -> Iterator[Measurement]:
+    """Answer for one window with the largest encoder-decoder, against eager float32, and with RN, against it."""
+    device, repeats = window.past.device, 3 * settings.repeats
+    network, residual = (subject.network().to(device).eval() for subject in (largest, RESIDUAL))
+    exact = largest.network(precision="float32").to(device).eval()
+    exact.to(memory_format=torch.contiguous_format)  # type: ignore[call-overload] # torch's stubs lack this form
+    answer, plain, by_residual = (partial(each.predict, window) for each in (network, exact, residual))
+    equal = (answer().argmax(dim=1) == plain().argmax(dim=1)).double().mean()
+    by_residual()
+    name = f"one window, {largest.name}"
+    yield Measurement(name, 1e3 * wall_s(lambda: answer().cpu(), repeats), "ms")
+    gain = times_as_fast(lambda: answer().cpu(), lambda: plain().cpu(), repeats, clock=seconds_passed)
+    yield Measurement(f"{name}, against eager float32", gain, "times", at_least=2.0)
+    yield Measurement(f"{name}, cells of equal class", 100.0 * float(equal), "%", at_least=99.5)
+    gain = times_as_fast(lambda: by_residual().cpu(), lambda: answer().cpu(), repeats, clock=seconds_passed)
+    yield Measurement(f"one window, RN, against {largest.name}", gain, "times", at_least=2.0)
+
+
+def _textbook_rate(config: NetworkSettings, settings: Settings, device: torch.device) -> float:
     size = {"batch": settings.batch, "updates": settings.updates, "epochs": settings.repeats + 1}
     seconds = train_by_the_book(config, random_windows(), device=device, **size)  # the first epoch warms up
     return settings.updates * settings.batch / median(seconds[1:])
 
 
 def _training_rate(
-    config: EncoderDecoderSettings, settings: Settings, device: torch.device, *, precision: Precision = "auto"
+    subject: Subject, settings: Settings, device: torch.device, *, precision: Precision = "auto"
 ) -> float:
-    training = TrainingConfig(
+    network = subject.network(
         epochs=settings.repeats + 1, updates_per_epoch=settings.updates, batch=settings.batch, precision=precision
     )
-    network = seeded_network(EncoderDecoder, config.model_copy(update={"training": training}), GIVEN, seed=0)
     with tempfile.TemporaryDirectory() as folder:
         trained = train(network, random_windows(), seed=0, device=device, folder=Path(folder))
     return settings.updates * settings.batch / median(row.seconds for row in trained.history[1:])
@@ -103,10 +149,10 @@ def _matrix_rate(settings: Settings, device: torch.device, dtype: torch.dtype) -
     return 2.0 * settings.matrix_rows**3 / median(seconds[1:])
 
 
-def flops_of_an_update(config: EncoderDecoderSettings, batch: int) -> float:
+def flops_of_an_update(subject: Subject, batch: int) -> float:
     """Count the floating-point operations of the network, forward and backward, over one batch."""
     windows = random_windows()
-    network = seeded_network(EncoderDecoder, config, GIVEN, seed=0)
+    network = subject.network()
     part = windows.batch(slice(0, 1))
     with FlopCounterMode(display=False) as counter:
         network.loss(network(part), part).backward()  # type: ignore[no-untyped-call]
@@ -114,7 +160,7 @@ def flops_of_an_update(config: EncoderDecoderSettings, batch: int) -> float:
 
 
 def train_by_the_book(
-    config: EncoderDecoderSettings, windows: WindowSet, *, batch: int, updates: int, epochs: int, device: torch.device
+    config: NetworkSettings, windows: WindowSet, *, batch: int, updates: int, epochs: int, device: torch.device
 ) -> list[float]:
     """Train as a textbook has it and return the seconds of each epoch of `updates` batches.
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import torch
 
-from semgrid_eval.bench import data, networks
+from semgrid_eval.bench import cells, data, logs, networks
+from semgrid_eval.bench.material import Material
 from semgrid_eval.bench.measurement import Measurement, Settings
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.faults import not_one_of
@@ -17,10 +18,13 @@ from semgrid_eval.progress import Progress, silent
 from semgrid_eval.runs.record import machine, versions
 
 _OF_DATA = {
+    "start": data.measure_start,
     "town": data.measure_town,
     "render": data.measure_rendering,
-    "logs": data.measure_logs,
-    "grids": data.measure_grids,
+    "convert": logs.measure_conversion,
+    "logs": logs.measure_logs,
+    "grids": cells.measure_grids,
+    "cells": cells.measure_cells,
 }
 _OF_NETWORKS = {"training": networks.measure_training, "prediction": networks.measure_prediction}
 PARTS = (*_OF_DATA, *_OF_NETWORKS)
@@ -42,7 +46,7 @@ def measure(
     chosen = [part for part in PARTS if part in parts]
     found: dict[str, list[Measurement]] = {}
     with tempfile.TemporaryDirectory(prefix="semgrid-bench-") as folder:
-        material = data.Material(Path(folder), settings)
+        material = Material(Path(folder), settings)
         for part in chosen:
             progress(len(found), len(chosen), part)
             measurements = _OF_DATA[part](material) if part in _OF_DATA else _OF_NETWORKS[part](settings, device)

@@ -1,4 +1,4 @@
-"""`semgrid-eval bench`: how fast everything is here, beside what is promised."""
+"""`semgrid-eval bench`: how fast everything is here, beside limits, rivals and goals."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -26,9 +26,11 @@ _SHOWN = ("processor", "cpu_cores", "torch_threads", "device", "gpu", "python", 
 def command(only: str | None, device: str, json_file: Path | None, *, quick: bool) -> None:
     """Measure the speed of this machine: medians of three, some minutes on two cores.
 
-    town: building a town and simulating its traffic; render: recordings of it; logs: writing, reading and checking a
-    log; grids: making them; training: of networks, against a textbook's float32 loop and against the product of large
-    matrices; prediction: with networks, and scoring. Where something is promised, that stands beside the number.
+    start: of a command; town: building a town and simulating its traffic; render: recordings of it; convert: a
+    Cityscapes tree, against copying it; logs: writing, reading and checking one, against the MCAP library and decoding;
+    grids: making them, against decoding; cells: projecting and drawing a frame, against plain NumPy; training: of
+    networks, against a textbook's float32 loop and against the product of large matrices; prediction: with networks,
+    against eager float32, and scoring, against Cityscapes' way. Goals stand beside the numbers.
     """
     from semgrid_eval.bench.measurement import FULL, QUICK
     from semgrid_eval.bench.suite import PARTS, conditions, load, measure
@@ -49,7 +51,7 @@ def command(only: str | None, device: str, json_file: Path | None, *, quick: boo
     click.echo(", ".join(f"{name} {here[name]}" for name in _SHOWN if name in here))
     for part, rows in found.items():
         for row in rows:
-            click.echo(f"{part:<11}{row.what:<46}{_number(row.value):>8} {row.unit:<10}{_promise(row)}".rstrip())
+            click.echo(f"{part:<11}{row.what:<52}{_number(row.value):>8} {row.unit:<15}{_verdict(row)}".rstrip())
 
 
 def _number(value: float) -> str:
@@ -57,7 +59,5 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
-def _promise(row: "Measurement") -> str:
-    if row.kept is None:
-        return ""
-    return f"at most {row.at_most:g}: {'kept' if row.kept else 'missed'}"
+def _verdict(row: "Measurement") -> str:
+    return f"{row.goal}{': short of the goal' if row.is_short else ''}"

@@ -3,12 +3,31 @@ from itertools import count
 
 import pytest
 
-from semgrid_eval.bench.measurement import Measurement, processor_s, wall_s
+from semgrid_eval.bench.measurement import Measurement, processor_s, times_as_fast, wall_s
 
 
-def test_a_promise_is_kept_up_to_its_limit():
-    kept = [Measurement("x", value, "s", limit).kept for value, limit in ((1.0, 1.0), (1.1, 1.0), (9.0, None))]
-    assert kept == [True, False, None]
+@pytest.mark.parametrize(
+    ("value", "goal", "words", "is_short"),
+    [
+        (1.0, {"at_most": 1.0}, "at most 1", False),
+        (1.1, {"at_most": 1.0}, "at most 1", True),
+        (1.7, {"at_least": 1.7}, "at least 1.7", False),
+        (1.6, {"at_least": 1.7}, "at least 1.7", True),
+        (9.0, {}, "", False),
+    ],
+)
+def test_a_goal_is_reached_up_to_its_limit(value, goal, words, is_short):
+    measured = Measurement("x", value, "s", **goal)
+    assert (measured.goal, measured.is_short) == (words, is_short)
+
+
+def test_the_median_of_pairs_counts():
+    now_s, passed = [0.0], iter((1.0, 2.0, 1.0, 9.0, 1.0, 3.0))  # the rival's first, of three pairs
+
+    def work():
+        now_s[0] += next(passed)
+
+    assert times_as_fast(work, work, 3, clock=lambda: now_s[0]) == 1.0 / 3.0
 
 
 def test_the_median_of_repeats_counts():

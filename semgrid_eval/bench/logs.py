@@ -1,0 +1,71 @@
+"""Measures the way from pictures to logs and back, beside copying, decoding and the MCAP library."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from semgrid_eval.bench.material import Material, pictures_of
+from semgrid_eval.bench.measurement import Measurement, seconds_passed, times_as_fast, wall_s
+from semgrid_eval.bench.rivals import decode_by_opencv, read_by_library
+from semgrid_eval.log.check import check_log
+from semgrid_eval.log.convert import Work
+from semgrid_eval.log.store import read_recording, write_log
+from semgrid_eval.log.topics import PICTURE_FIELDS
+from semgrid_eval.sources.cityscapes.source import CityscapesOptions
+from semgrid_eval.sources.cityscapes.tree import convert_cityscapes
+
+_MEGABYTE = 1e6
+
+
+def measure_conversion(material: Material) -> Iterator[Measurement]:
+    """Convert a Cityscapes tree, against copying it, and with several workers."""
+    settings, tree, folder = material.settings, material.tree, material.folder / "converted"
+    megabytes = sum(path.stat().st_size for path in tree.rglob("*") if path.is_file()) / _MEGABYTE
+    work_on = partial(_convert_anew, tree, folder)
+    alone_s = wall_s(work_on, settings.repeats)
+    yield Measurement(f"tree of {megabytes:.0f} MB converted", megabytes / alone_s, "MB/s")
+    copied = times_as_fast(partial(_copy_anew, tree, folder), work_on, settings.repeats)
+    yield Measurement("converted, against copying it", copied, "times its time", at_most=1.3)
+    together = partial(_convert_anew, tree, folder, workers=settings.workers)
+    gain = times_as_fast(together, work_on, settings.repeats, clock=seconds_passed)
+    yield Measurement(f"converted by {settings.workers} workers", gain, "times", at_least=1.7)
+
+
+def measure_logs(material: Material) -> Iterator[Measurement]:
+    """Write a log from frames in memory, read all of it and check it; against decoding, and the MCAP library."""
+    repeats, path, written = material.settings.repeats, material.log, material.folder / "written.mcap"
+    megabytes = path.stat().st_size / _MEGABYTE
+    looked_through = replace(material.recording, encoded_here=False)  # as if others had made its pictures
+    write, read, check = partial(write_log, material.recording, written), partial(_read, path), partial(check_log, path)
+    library = partial(read_by_library, path)
+    decode = partial(decode_by_opencv, pictures_of(path, PICTURE_FIELDS))
+    rates: tuple[tuple[str, Callable[[], object], float | None], ...] = (
+        ("written", write, 400.0),
+        ("written, its pictures looked through", partial(write_log, looked_through, written), None),
+        ("read", read, 600.0),
+        ("checked", check, None),
+    )
+    for what, work, at_least in rates:
+        rate = megabytes / wall_s(work, repeats)
+        yield Measurement(f"log of {megabytes:.1f} MB {what}", rate, "MB/s", at_least=at_least)
+    yield Measurement("read, against the MCAP library", times_as_fast(read, library, repeats), "times")
+    yield Measurement(
+        "checked, against decoding by OpenCV", times_as_fast(check, decode, repeats), "times", at_least=1.0
+    )
+
+
+def _convert_anew(tree: Path, folder: Path, *, workers: int = 1) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    convert_cityscapes(CityscapesOptions(src=tree), folder, Work(workers=workers))
+
+
+def _copy_anew(tree: Path, folder: Path) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(tree, folder)
+
+
+def _read(path: Path) -> None:
+    for _ in read_recording(path).moments():
+        pass
