@@ -74,6 +74,8 @@ def moments(stretch: Stretch) -> Iterator[Moment]:
     for stamp_ns, frames in groupby(_gathered(stretch), key=lambda each: each[0].stamp_ns):
         cameras, sweeps = makers.made(frames)
         yield Moment(stamp_ns, cameras, tuple(_until(stamp_ns, coming)), sweeps=sweeps)
+    if coming and stretch.frames[-1].stamp_ns not in {each.stamp_ns for each in stretch.motion}:
+        yield Moment(coming[0].stamp_ns, {}, (coming[0],))  # motion covers all frames
 
 
 class _Makers:
