@@ -1,6 +1,8 @@
 """What docs/lidar.md shows is run on small data, and its tables are those of the code."""
 
+import re
 import shlex
+from html import unescape
 from pathlib import Path
 
 import pytest
@@ -46,6 +48,9 @@ def test_commands_for_kitti(workplace):
     run(LIDAR)
     rows = read_run(Path("runs/lidar")).rows
     assert {row.name: row.failure for row in rows} == dict.fromkeys(("BL-NT", "BL-DC", "BL-Fuse"))
+    offered = re.findall(r"semgrid-eval (play [^<]+)<", Path("runs/lidar/report/index.html").read_text())
+    assert offered
+    assert run_command(shlex.split(unescape(offered[0]).replace("RUN", "runs/lidar"))).code == 0
 
 
 def test_commands_for_argoverse(workplace):
