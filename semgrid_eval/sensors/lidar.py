@@ -34,7 +34,8 @@ class LidarSensor(SensorConfig):
     # The paper's kernels close gaps of one cell and then delete what is less than four cells wide. Rings on the ground
     # are one cell wide and farther apart than that, from some 15 m on for 64 rings: so nothing is done by default.
     morphology: Morphology | None = Field("off")
-    # None takes the points' own labels, and is not written, so that grids of these keep their digests.
+    # The camera whose label images colour the points. None takes the points' own labels, and is not written, so that
+    # grids of these keep their digests.
     colour_from: ColourFrom | None = Field(None, exclude_if=lambda value: value is None)
 
 

@@ -1,7 +1,10 @@
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from support.ros_messages import cloud
 
 from semgrid_eval.errors import InputError
@@ -74,3 +77,21 @@ def test_a_cloud_that_is_not_what_it_says_is_refused_before_anything_is_made_of_
     with pytest.raises(InputError) as raised:
         columns_of(message, MAP)
     assert str(raised.value) == line
+
+
+SMALL = st.integers(0, 70)
+NUMBER = st.one_of(SMALL, st.integers(0, 2**32 - 1))
+
+
+@given(NUMBER, NUMBER, NUMBER, NUMBER, st.integers(0, 130))
+def test_whatever_a_cloud_says_of_its_size_there_are_points_or_a_line(width, height, point_step, row_step, count):
+    changes = {"width": width, "height": height, "point_step": point_step, "row_step": row_step}
+    message = replace(WHOLE, **changes, data=np.resize(WHOLE.data, count))
+    with suppress(InputError):
+        assert len(columns_of(message, MAP)) == width * height
+
+
+@given(st.sampled_from("xyzt"), NUMBER, st.integers(0, 255), st.integers(0, 2**32 - 1))
+def test_whatever_a_cloud_says_of_its_fields_there_are_points_or_a_line(name, offset, datatype, count):
+    with suppress(InputError):
+        assert len(columns_of(renamed(WHOLE, name, offset=offset, datatype=datatype, count=count), MAP)) == 6
