@@ -29,6 +29,7 @@ from semgrid_eval.log.store import find_logs, read_recording
 from semgrid_eval.recording.types import Moment, Recording
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sensors.lidar import ColourFrom, LidarSensor
+from semgrid_eval.sensors.sensor import SensorConfig
 from semgrid_eval.sources.cityscapes.source import CityscapesOptions
 from semgrid_eval.sources.cityscapes.tree import find_sequences
 from semgrid_eval.sources.kitti.convert import convert_kitti
@@ -44,8 +45,8 @@ CODINGS = {
     "organised in 64 padded rows, NaN where there is no point": ("mcap", Coding(rows=64, padding=8)),
 }
 RANGES_M = ((0, 10), (10, 20), (20, 30), (30, 40), (40, 60))
-SETTINGS = {"sensors": {"top": LidarSensor()}, "target": ("top",)}
-SENSORS = {
+LIDAR = GridConfig(sensors={"top": LidarSensor()}, target=("top",))
+SENSORS: dict[str, SensorConfig] = {
     "own": LidarSensor(),
     "coloured": LidarSensor(colour_from=ColourFrom()),
     "unhidden": LidarSensor(colour_from=ColourFrom(occlusion_px=0)),
@@ -74,7 +75,7 @@ def main() -> None:
 
 
 def _print_codings(recordings: dict[str, Recording], src: Path, out: Path) -> None:
-    expected = {log.stem: _grids(log, GridConfig(**SETTINGS))[0] for log in find_logs(out / "kitti")}
+    expected = {log.stem: _grids(log, LIDAR)[0] for log in find_logs(out / "kitti")}
     print("| clouds | equal cells | of those that either knows |\n|---|---|---|")
     for number, (what, (storage, coding)) in enumerate(CODINGS.items()):
         raw = coding.labels == "u4"
@@ -83,7 +84,7 @@ def _print_codings(recordings: dict[str, Recording], src: Path, out: Path) -> No
             for each in recordings.values()
         ]
         text = RigBag(next(iter(recordings.values())), coding).map_text(ids="semantickitti" if raw else "label_ids")
-        found = {log.stem[: -len("_000000")]: _grids(log, GridConfig(**SETTINGS))[0] for log in _logs(bags, text)}
+        found = {log.stem[: -len("_000000")]: _grids(log, LIDAR)[0] for log in _logs(bags, text)}
         ours, theirs = (np.concatenate([grids[name] for name in recordings]) for grids in (found, expected))
         equal, known = ours == theirs, (ours > 0) | (theirs > 0)
         print(f"| {what} | {equal.mean():.2%} | {equal[known].mean():.2%} |", flush=True)

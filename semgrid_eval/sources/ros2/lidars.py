@@ -67,20 +67,28 @@ class Sweeps:
         points = columns_of(message, self._lidar)
         place_m = np.stack([points[axis] for axis in PLACE], axis=1).astype(np.float64)
         returned = np.isfinite(place_m).all(axis=1) & place_m.any(axis=1)
-        points, place_m = points[returned], place_m[returned]
-        if self._lidar.times is not None:
-            offset_ns = _offsets_ns(points, self._lidar.times, stamp_ns)
-            place_m = deskewed(place_m, offset_ns, stamp_ns, self._mount.ego_from_sensor, self._motion)
-        intensity = points[INTENSITY] if INTENSITY in (points.dtype.names or ()) else np.zeros(len(points))
-        return LidarSweep(
-            stamp_ns, self._mount, place_m.astype(np.float32), intensity.astype(np.float32), self._label_id(points)
-        )
+        points = points[returned]
+        with np.errstate(over="ignore", invalid="ignore"):  # what is too large then is refused
+            moved_m = self._at_stamp(place_m[returned], points, stamp_ns).astype(np.float32)
+            intensity = _intensity(points)
+        return LidarSweep(stamp_ns, self._mount, moved_m, intensity, self._label_id(points))
+
+    def _at_stamp(self, place_m: NDArray[np.float64], points: Columns, stamp_ns: int) -> NDArray[np.float64]:
+        if self._lidar.times is None:
+            return place_m
+        offset_ns = _offsets_ns(points, self._lidar.times, stamp_ns)
+        return deskewed(place_m, offset_ns, stamp_ns, self._mount.ego_from_sensor, self._motion)
 
     def _label_id(self, points: Columns) -> NDArray[np.uint8] | None:
         if self._lidar.label_field is None:
             return None
         given = points[self._lidar.label_field]
         return self._labels.label_ids(given & _CLASS_BITS if self._lidar.ids == "semantickitti" else given)
+
+
+def _intensity(points: Columns) -> NDArray[np.float32]:
+    known = INTENSITY in (points.dtype.names or ())
+    return points[INTENSITY].astype(np.float32) if known else np.zeros(len(points), np.float32)
 
 
 def _offsets_ns(points: Columns, times: PointTimes, stamp_ns: int) -> NDArray[np.float64]:

@@ -126,3 +126,8 @@ def test_times_of_points_that_are_left_out_do_not_matter():
     lidar = LidarMap(cloud="/points", times=PointTimes(field="t", unit="s"))
     given = columns((1, 2, 3), (math.nan,) * 3) | {"t": np.array([0.0, math.nan])}
     assert len(sweep(given, lidar).points_m) == 1
+
+
+def test_a_place_that_no_lidar_sees_is_refused():
+    with pytest.raises(InputError, match=r"^point 1, \(inf, 0, 0\) m, is not within 1000 m of the LiDAR$"):
+        sweep({"x": np.array([1.0, 1e300]), "y": np.zeros(2), "z": np.zeros(2)})
