@@ -13,8 +13,8 @@ a point cloud, its points brought to the time of its stamp. Windows count frames
 sweeps are missing, and after --recording-s.
 
 A bag fails as a whole, in one line, if a topic is missing or changes, its calibration is of another size, a cloud has
-not the fields that the map names, its clock jumps or it is damaged. The others are converted; the exit code is then 1. Logs whose inputs have not changed are left
-as they are.
+not the fields that the map names, its clock jumps or it is damaged. The others are converted; the exit code is then 1.
+Logs whose inputs have not changed are left as they are.
 """
 
 SOURCE = Source(
