@@ -29,6 +29,7 @@ from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.facts import RowFacts, StreamFacts, StreamRecord
 from semgrid_eval.scores.results import LogRecord, ResultRecord, RowRecord, RunRecord, WindowRecord
 from semgrid_eval.sensors.kinds import KINDS
+from semgrid_eval.sensors.lidar import ColourFrom
 from semgrid_eval.streams.config import StreamConfig
 from semgrid_eval.streams.profile import LatencyProfile, MadeBy
 from semgrid_eval.windows.disturb.kinds import KINDS as DISTURBANCES
@@ -43,6 +44,7 @@ MATRIX: tuple[tuple[str, type[Config]], ...] = (
     ("`grid`", GridConfig),
     ("`grid.spec`", GridSpec),
     *((f"`grid.sensors`: kind `{name}`", kind.config) for name, kind in KINDS.items()),
+    ("`colour_from` of a `lidar`", ColourFrom),
     ("`stream`", StreamConfig),
     *((f"`disturb`: kind `{name}`", kind) for name, kind in DISTURBANCES.items()),
     ("`settings` of all networks", NetworkSettings),

@@ -18,7 +18,7 @@ def show(summary: "ConversionSummary", out: Path) -> int:
     others = _strays(out, summary)
     if others:
         complain(f"Warning: {out} holds {len(others)} logs that do not belong to this conversion, such as {others[0]}")
-    if summary.remark:
+    if summary.remark and (summary.written or summary.skipped):  # it is about logs that there are
         (complain if summary.remark.startswith("Warning") else say)(summary.remark)
     return 1 if summary.failed else 0
 

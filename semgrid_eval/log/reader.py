@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.faults import not_one_of
 from semgrid_eval.log import codec, recovered, topics
 from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene
 from semgrid_eval.log.container import Container, damage_as_log_error
@@ -209,10 +210,10 @@ class LogReader(Container):
 
     def _choose(self, wanted: str | None, there: tuple[str, ...], what: str) -> str:
         chosen = there[0] if wanted is None and len(there) == 1 else wanted
-        if chosen not in there:
-            known = ", ".join(there) or "none"
-            raise LogError(f"{wanted or '(not given)'} is not one of: {known}", path=self.path, field=what)
-        return chosen
+        if chosen in there:
+            return chosen
+        fault = f"there are several, name one: {', '.join(there)}" if chosen is None else not_one_of(chosen, there)
+        raise LogError(fault if there else "the log has none", path=self.path, field=what)
 
     def _first(self, topic: str) -> bytes:
         entry = next(self.messages([topic]), None)

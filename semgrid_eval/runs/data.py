@@ -91,8 +91,7 @@ class RunData:
             data_set = self.grids(config)
             chosen = [recording for recording in data_set.recordings if recording.split == split]
             if not chosen:
-                found = ", ".join(sorted({record.split for record in self.records.values()})) or "none"
-                raise InputError(f"no recording of split {split!r} gave grids (splits found: {found})")
+                raise InputError(self._why_none(data_set, split))
             sensors = list(dict.fromkeys(self._sensors[key[0]]))
             stacked = stack_recordings(chosen, cell_m=config.spec.cell_m, sensors=sensors)
             self._stacked[key] = stacked.to(self._device)
@@ -132,6 +131,15 @@ class RunData:
                     checksums=recording.has_checksums,
                 )
         return self._sets[key]
+
+    def _why_none(self, data_set: GridDataSet, split: str) -> str:
+        """Say why there are no grids of a split: of the reasons for which all logs failed, the first."""
+        if len(data_set.failed) == len(self._logs):
+            log, reason = min(data_set.failed.items())
+            first = reason.replace(log, str(Path(log).relative_to(self._folder)))
+            return f"none of the logs ({len(self._logs)}) gave grids; the first fails by: {first}"
+        found = ", ".join(sorted({record.split for record in self.records.values()}))
+        return f"no recording of split {split!r} gave grids (splits found: {found})"
 
 
 def grid_digest(config: GridConfig) -> str:

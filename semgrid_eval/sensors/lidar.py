@@ -1,4 +1,4 @@
-"""LiDARs whose points have labels: each sweep is an observation of its own time."""
+"""LiDARs whose points have labels, or get them of a camera: each sweep is an observation of its own time."""
 
 import heapq
 from collections.abc import Iterator, Mapping
@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from semgrid_eval.classes import NO_POINT
+from semgrid_eval.config import Config
 from semgrid_eval.errors import LogError
 from semgrid_eval.sensors.sensor import Morphology, Points, SensorConfig
 
@@ -16,35 +18,62 @@ if TYPE_CHECKING:
     from semgrid_eval.recording.lidar import LidarSweep
 
 
+class ColourFrom(Config):
+    """Which camera's label images colour points, and which of its pixels."""
+
+    camera: str | None = None  # its name in the log; None takes a log's only one
+    within_s: float = Field(0.1, ge=0.0, le=1.0)  # of a sweep, before or after it: the nearest label image in that time
+    occlusion_px: int = Field(4, ge=0, le=64)  # how far beside a point, in pixels of the label image, another hides it
+
+
 class LidarSensor(SensorConfig):
-    """All points of a LiDAR that have a label of a grid class."""
+    """All points of a LiDAR that have a label of a grid class, their own or a camera's."""
 
     kind: Literal["lidar"] = "lidar"
     lidar: str | None = None  # its name in the log; None takes a log's only one
     # The paper's kernels close gaps of one cell and then delete what is less than four cells wide. Rings on the ground
     # are one cell wide and farther apart than that, from some 15 m on for 64 rings: so nothing is done by default.
     morphology: Morphology | None = Field("off")
+    # The camera whose label images colour the points. None takes the points' own labels, and is not written, so that
+    # grids of these keep their digests.
+    colour_from: ColourFrom | None = Field(None, exclude_if=lambda value: value is None)
 
 
 def read_lidars(
     log: "LogReader", sensors: Mapping[str, LidarSensor], class_by_label: NDArray[np.uint8]
 ) -> Iterator[Points]:
     """Iterate over what LiDARs see, each sweep decoded once, as `Kind` says."""
-    by_lidar: dict[str, list[str]] = {}
+    by_lidar: dict[str, dict[str, LidarSensor]] = {}
     for name, sensor in sensors.items():
-        by_lidar.setdefault(log.choose_lidar(sensor.lidar), []).append(name)
-    streams = [_read_lidar(log, lidar, names, class_by_label) for lidar, names in by_lidar.items()]
+        by_lidar.setdefault(log.choose_lidar(sensor.lidar), {})[name] = sensor
+    streams = [_read_lidar(log, lidar, chosen, class_by_label) for lidar, chosen in by_lidar.items()]
     return heapq.merge(*streams, key=lambda points: points.stamp_ns)
 
 
-def _read_lidar(log: "LogReader", lidar: str, names: list[str], class_by_label: NDArray[np.uint8]) -> Iterator[Points]:
+def _read_lidar(
+    log: "LogReader", lidar: str, sensors: Mapping[str, LidarSensor], class_by_label: NDArray[np.uint8]
+) -> Iterator[Points]:
+    # Whoever reads settings alone does not wait for a compiler.
+    from semgrid_eval.sensors.colouring import Colouring
+
+    colourings = {name: Colouring(log, each.colour_from) for name, each in sensors.items() if each.colour_from}
     for sweep in log.sweeps(lidar):
-        if sweep.label_id is None:
-            place = f"sweep of {lidar} at {sweep.stamp_ns} ns"
-            raise LogError("has no labels; a grid needs one for each point", path=log.path, field=place)
         place_m = _in_vehicle(sweep)
-        for name in names:
-            yield Points(name, sweep.stamp_ns, place_m[:, 0], place_m[:, 1], class_by_label[sweep.label_id])
+        for name in sensors:
+            if name in colourings:
+                coloured = colourings[name].colour(sweep.stamp_ns, place_m)
+                class_id = np.where(coloured.seen, class_by_label[coloured.label_id], np.uint8(NO_POINT))
+            else:
+                class_id = class_by_label[_own_labels(log, lidar, sweep)]
+            yield Points(name, sweep.stamp_ns, place_m[:, 0], place_m[:, 1], class_id)
+
+
+def _own_labels(log: "LogReader", lidar: str, sweep: "LidarSweep") -> NDArray[np.uint8]:
+    if sweep.label_id is None:
+        place = f"sweep of {lidar} at {sweep.stamp_ns} ns"
+        message = "has no labels; a grid needs them, or `colour_from`: a camera whose label images colour the points"
+        raise LogError(message, path=log.path, field=place)
+    return sweep.label_id
 
 
 def _in_vehicle(sweep: "LidarSweep") -> NDArray[np.float64]:

@@ -1,6 +1,8 @@
 """What docs/lidar.md shows is run on small data, and its tables are those of the code."""
 
+import re
 import shlex
+from html import unescape
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from support.pages import blocks, commands, text_of
 from semgrid_eval.config import parse_config
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.scores.results import read_run
+from semgrid_eval.sensors.lidar import ColourFrom
 from semgrid_eval.sources.argoverse2.categories import CATEGORIES
 from semgrid_eval.sources.kitti.labels import CLASSES
 
@@ -46,6 +49,9 @@ def test_commands_for_kitti(workplace):
     run(LIDAR)
     rows = read_run(Path("runs/lidar")).rows
     assert {row.name: row.failure for row in rows} == dict.fromkeys(("BL-NT", "BL-DC", "BL-Fuse"))
+    offered = re.findall(r"semgrid-eval (play [^<]+)<", Path("runs/lidar/report/index.html").read_text())
+    assert offered
+    assert run_command(shlex.split(unescape(offered[0]).replace("RUN", "runs/lidar"))).code == 0
 
 
 def test_commands_for_argoverse(workplace):
@@ -62,8 +68,10 @@ def test_commands_for_argoverse(workplace):
 
 
 def test_other_settings_of_the_page_are_valid():
-    (block,) = [yaml.safe_load(each) for each in blocks("yaml", PAGE) if "\nrows:" not in each]
-    assert parse_config(GridConfig, block["grid"]).target_row == "top+left"
+    others = [yaml.safe_load(each)["grid"] for each in blocks("yaml", PAGE) if "\nrows:" not in each]
+    both, coloured = (parse_config(GridConfig, each) for each in others)
+    assert both.target_row == "top+left"
+    assert coloured.sensors["top"].colour_from == ColourFrom(camera="left", within_s=0.1, occlusion_px=4)
 
 
 @pytest.mark.parametrize(

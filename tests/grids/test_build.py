@@ -175,7 +175,7 @@ def test_longer_logs_are_cut_into_stretches_that_begin_straight(tmp_path):
 
 
 def test_a_camera_that_a_log_lacks_is_named(tmp_path):
-    with pytest.raises(LogError, match=r"toy\.mcap: camera: rear is not one of: front"):
+    with pytest.raises(LogError, match=r"toy\.mcap: camera: 'rear' is not front, the only choice"):
         built(street(1, frames=1), tmp_path, GridConfig(sensors={"full": CameraSensor(camera="rear")}))
 
 

@@ -141,7 +141,7 @@ def test_sweeps_of_several_lidars_stand_beside_cameras(both):
         assert [each.stamp_ns for each in top] == [moment.stamp_ns for moment in driving().moments()]
         equal(top[0], sweep(top[0].stamp_ns, POINTS, ["car"] * 3))
         assert {len(each.points_m) for each in log.sweeps("rear")} == {1}
-        with pytest.raises(LogError, match=r"both\.mcap: lidar: \(not given\) is not one of: rear, top$"):
+        with pytest.raises(LogError, match=r"both\.mcap: lidar: there are several, name one: rear, top$"):
             log.choose_lidar(None)
 
 

@@ -112,9 +112,11 @@ def test_frames_are_found_by_their_times(log):
         backdrop.frame_at(17)
 
 
-@pytest.mark.parametrize(("camera", "name"), [(None, "not given"), ("side", "side")])
-def test_a_camera_that_is_not_there_is_named(log, camera, name):
-    with pytest.raises(LogError, match=rf"{name}.* is not one of: front, rear"):
+@pytest.mark.parametrize(
+    ("camera", "told"), [(None, "there are several, name one: front"), ("side", "'side' is not one of front")]
+)
+def test_a_camera_that_is_not_there_is_named(log, camera, told):
+    with pytest.raises(LogError, match=f"camera: {told}, rear"):
         Backdrop(log, grid_of(camera))
 
 

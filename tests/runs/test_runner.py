@@ -261,6 +261,15 @@ def test_logs_too_short_for_a_window_are_named(logs, tmp_path):
     assert record.failed_logs == {"short.mcap": "short.mcap: has 5 frames, and a window needs 9"}
 
 
+def test_where_no_log_gives_grids_the_row_says_why(logs, tmp_path):
+    grid = {"sensors": {"top": {"kind": "lidar"}}, "target": ["top"]}
+    record = run([{"name": "BL-DC", "model": "newest", "grid": grid}], logs, tmp_path / "run")
+    log, reason = min(record.failed_logs.items())
+    assert reason == f"{log}: lidar: the log has none"
+    count = len(record.failed_logs)
+    assert record.rows[0].failure == f"none of the logs ({count}) gave grids; the first fails by: {reason}"
+
+
 def test_a_damaged_log_is_named_by_its_place_and_the_others_are_scored(logs, tmp_path):
     folder = tmp_path / "logs"
     write_log(street(1, frames=9).recording("good"), folder / "val" / "good.mcap")

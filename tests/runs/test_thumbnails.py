@@ -185,7 +185,7 @@ def test_frames_that_a_log_does_not_have_stay_empty_and_another_log_gives_none(l
     rear = GridConfig(sensors={"full": CameraSensor(camera="rear")})
     for known, grid, message in (
         ("another", GridConfig(), "has digest"),
-        (digest(log), rear, "rear is not one of: front"),
+        (digest(log), rear, "'rear' is not front, the only choice"),
     ):
         with pytest.raises(LogError, match=message):
             log_pictures(log, known, grid, [START_NS])

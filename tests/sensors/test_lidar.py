@@ -157,12 +157,12 @@ def test_sweeps_without_labels_and_logs_without_lidars_are_refused_in_a_line(tmp
     bare = sweep(START_NS, [(5.0, 0.0, 0.0)])
     moment = Moment(START_NS, {}, (MotionSample(START_NS, 0.0, 0.0),), sweeps={"top": bare})
     settings = {"sensors": {"top": LidarSensor()}, "target": ("top",)}
-    told = rf"log\.mcap: sweep of top at {START_NS} ns: has no labels; a grid needs one for each point$"
+    told = rf"log\.mcap: sweep of top at {START_NS} ns: has no labels; a grid needs them, or `colour_from`: a camera"
     with pytest.raises(LogError, match=told):
         built(recorded(lambda: iter([moment])), tmp_path, **settings)
-    with pytest.raises(LogError, match=r"log\.mcap: lidar: \(not given\) is not one of: none$"):
+    with pytest.raises(LogError, match=r"log\.mcap: lidar: the log has none$"):
         built(recorded(lambda: iter([replace(moment, sweeps={})])), tmp_path, **settings)
-    with pytest.raises(ConfigError, match="top_px: unknown key; allowed here: kind, lidar, max_age_s, morphology"):
+    with pytest.raises(ConfigError, match="top_px: unknown key; allowed here: colour_from, kind, lidar, max_age_s"):
         parse_config(GridConfig, {"sensors": {"full": {"kind": "lidar", "top_px": 3}}})
 
 

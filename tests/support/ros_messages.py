@@ -10,7 +10,7 @@ from semgrid_eval.geometry import CAMERA_FROM_OPTICAL
 from semgrid_eval.recording.types import CameraCalibration, MotionSample
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
-OPTICAL, VEHICLE = "camera_left_optical", "base_link"
+OPTICAL, VEHICLE, LIDAR = "camera_left_optical", "base_link", "lidar"
 
 
 def kind(name: str) -> Any:
@@ -90,6 +90,34 @@ def disparity_image(stamp_ns: int, disparity_px: np.ndarray, calibration: Camera
         min_disparity=0.0,
         max_disparity=256.0,
         delta_d=1 / 16,
+    )
+
+
+NUMBERS = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
+"""What PointField calls types of numbers."""
+
+
+def cloud(
+    stamp_ns: int, points: np.ndarray, *, frame: str = LIDAR, rows: int = 1, padding: int = 0, big: bool = False
+) -> Any:
+    """Return a PointCloud2 of a structured array (N,), in rows that end with so many bytes that mean nothing."""
+    dtype = points.dtype.newbyteorder(">" if big else "<")
+    fields = [
+        kind("sensor_msgs/PointField")(name=name, offset=offset, datatype=NUMBERS[each.str[1:]], count=1)
+        for name, (each, offset) in ((name, dtype.fields[name]) for name in dtype.names)
+    ]
+    lines = np.ascontiguousarray(points.astype(dtype)).view(np.uint8).reshape(rows, -1)
+    data = np.pad(lines, ((0, 0), (0, padding)), constant_values=77)
+    return kind("sensor_msgs/PointCloud2")(
+        header=header(stamp_ns, frame),
+        height=rows,
+        width=len(points) // rows,
+        fields=fields,
+        is_bigendian=big,
+        point_step=dtype.itemsize,
+        row_step=data.shape[1],
+        data=data.reshape(-1),
+        is_dense=True,
     )
 
 

@@ -157,7 +157,7 @@ def draw_examples(shown: Shown, picks: Sequence[Pick], thumbnails: RunThumbnails
             title="; ".join(f"{pick.reason}: {(signed if contest.rivals else number)(pick.score)}" for pick in group),
             window=window,
             times=times(window.target_stamp_ns, kept),
-            command=thumbnails.command(contest.model, window),
+            command=thumbnails.command(contest.model, window, result.grid),
             film=film,
             answers=answers,
             legend=tuple(drawing.LEGEND[i] for i in sorted(colours | ({drawing.HATCHED} if hatching else set()))),

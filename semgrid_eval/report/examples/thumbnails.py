@@ -43,9 +43,10 @@ class RunThumbnails:
         """Return the track of such a log alone; all that are asked for stay in memory."""
         return self._read_track(self._file(log, result))
 
-    def command(self, row: Row, window: WindowRecord) -> str:
-        """Write the command that plays a window's recording."""
-        return play_command(self._run.record.command, row.record.name, window.recording)
+    def command(self, row: Row, window: WindowRecord, grid: GridConfig | None) -> str:
+        """Write the command that plays a window's recording; with its log only where a camera leads the target."""
+        has_camera = grid is None or grid.camera is not None
+        return play_command(self._run.record.command, row.record.name, window.recording, with_logs=has_camera)
 
     def _file(self, log: str, result: Result) -> Path | None:
         asked = (log, result.folder)

@@ -10,6 +10,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.bag import Arrival, Bag
 from semgrid_eval.sources.ros2.cameras import Info
+from semgrid_eval.sources.ros2.clouds_seen import CloudSeen, look_at_cloud
 from semgrid_eval.sources.ros2.pictures import Shape, ids_of, require_coding, shape_of
 from semgrid_eval.sources.ros2.scan import frame_of, stamp_of
 from semgrid_eval.sources.ros2.transforms import Transforms
@@ -31,7 +32,8 @@ class Seen:
     shape: Shape | None = None  # of a picture
     info: Info | None = None
     highest_id: int | None = None  # in the first picture, if it can hold ids; 255 does not count
-    fault: str = ""  # why the first picture cannot be read
+    cloud: CloudSeen | None = None
+    fault: str = ""  # why the first picture or cloud cannot be read
 
     @property
     def rate_hz(self) -> float | None:
@@ -88,14 +90,14 @@ def _look_closely(seen: Seen, message: Any) -> None:  # noqa: ANN401
     seen.child = str(getattr(message, "child_frame_id", ""))
     if seen.kind == kinds.CAMERA_INFO:
         seen.info = Info.of(message)
-    if seen.kind not in (*kinds.PICTURES, kinds.DISPARITY):
-        return
     try:
-        seen.shape = shape_of(message.image if seen.kind == kinds.DISPARITY else message)
+        if seen.kind == kinds.POINTS:
+            seen.cloud = look_at_cloud(message)
+        elif seen.kind in (*kinds.PICTURES, kinds.DISPARITY):
+            seen.shape = shape_of(message.image if seen.kind == kinds.DISPARITY else message)
+            seen.highest_id = _highest_id(seen, message)
     except InputError as error:
         seen.fault = str(error)
-        return
-    seen.highest_id = _highest_id(seen, message)
 
 
 def _highest_id(seen: Seen, message: Any) -> int | None:  # noqa: ANN401

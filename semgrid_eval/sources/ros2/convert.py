@@ -60,13 +60,17 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
         return ""
     lost = sum((plan.lost for plan in plans), Counter[str]())
     total, kept = sum(plan.frames for plan in plans), sum(len(each.frames) for plan in plans for each in plan.stretches)
-    parts = [f"{kept} of {total} frames; {told(lost)}", *_codings(plans[0])]
+    what = "frames and sweeps" if mapping.lidars else "frames"
+    parts = [f"{kept} of {total} {what}; {told(lost)}", *_codings(plans[0])]
     if repeated := sum(plan.repeated for plan in plans):
         parts.append(f"{repeated} messages with a stamp that was there before left out")
     unlabelled = [name for name, camera in mapping.cameras.items() if camera.labels is None]
     if unlabelled:
         command = f"semgrid-eval segment {out} --model NETWORK.onnx --out LABELLED"
         parts.append(f"no labels for {', '.join(unlabelled)}: add them with {command}")
+    if bare := [name for name, lidar in mapping.lidars.items() if lidar.label_field is None]:
+        advice = "a grid needs `label_field` in the map, or a camera to colour them: `colour_from` of the sensor"
+        parts.append(f"points of {', '.join(bare)} have no labels: {advice}")
     return "; ".join(parts)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from semgrid_eval.errors import InputError
 from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.contents import Contents, Seen
+from semgrid_eval.sources.ros2.draft_lidars import draft_lidars
 from semgrid_eval.sources.ros2.pictures import require_coding
 
 _LABEL_WORDS = ("label", "segment", "semantic", "/seg", "_seg")
@@ -26,8 +27,8 @@ def draft_map(contents: Contents) -> str:
         "  rear_axle_m: 0.0  # how far its origin lies ahead of the rear axle",
         *(["clock: received  # header stamps are all zero"] if contents.unstamped else []),
         *_motion(contents, vehicle),
-        "cameras:",
         *_camera(contents, vehicle),
+        *draft_lidars(contents, vehicle),
     ]
     return "\n".join(lines) + "\n"
 
@@ -54,6 +55,9 @@ def _motion(contents: Contents, vehicle: str) -> Iterator[str]:
 
 def _camera(contents: Contents, vehicle: str) -> Iterator[str]:
     found = _Pictures(contents)
+    if not found.any and any(seen.cloud for seen in contents.topics.values()):
+        return  # a LiDAR alone
+    yield "cameras:"
     yield "  front:"
     if found.image:
         yield f"    image: {found.image}"

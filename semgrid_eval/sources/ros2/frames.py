@@ -1,4 +1,4 @@
-"""Which pictures make a frame, and which frames make a recording: by stamps alone."""
+"""Which messages make a frame, and which frames make a recording: by stamps alone."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -18,12 +18,14 @@ from semgrid_eval.sources.ros2.mapping import CameraMap
 _HOLE_PERIODS = 1.5
 _LEAST_FRAMES = 2
 _NS_PER_S = 1e9
+CLOUD = "cloud"
+"""What the message of a sweep is."""
 Stamps = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Piece:
-    """One picture of a frame."""
+    """One message of a frame."""
 
     topic: str
     stamp_ns: int
@@ -33,15 +35,15 @@ class Piece:
 
 @dataclass(frozen=True)
 class FramePlan:
-    """One frame of a camera: its time, and its pictures by what they are."""
+    """One frame of a camera with its pictures, by what they are, or one sweep of a LiDAR with its `cloud`."""
 
-    camera: str
+    sensor: str
     stamp_ns: int
     pieces: dict[str, Piece]
 
     def described(self) -> list[Any]:
-        """Return as JSON what determines the frame: its pictures count by the digests of their messages."""
-        return [self.camera, self.stamp_ns, {what: piece.digest for what, piece in self.pieces.items()}]
+        """Return as JSON what determines the frame: its messages count by their digests."""
+        return [self.sensor, self.stamp_ns, {what: piece.digest for what, piece in self.pieces.items()}]
 
 
 def frames_of(
@@ -70,7 +72,13 @@ def frames_of(
     return [FramePlan(name, int(base.stamps_ns[at]), each) for at, each in zip(kept, pieces, strict=True)]
 
 
-def _piece(arrivals: Arrivals, at: np.intp) -> Piece:
+def sweeps_of(name: str, arrivals: Arrivals) -> list[FramePlan]:
+    """Return the sweeps of a LiDAR: each of its clouds is one."""
+    pieces = (_piece(arrivals, at) for at in range(len(arrivals.stamps_ns)))
+    return [FramePlan(name, piece.stamp_ns, {CLOUD: piece}) for piece in pieces]
+
+
+def _piece(arrivals: Arrivals, at: int | np.intp) -> Piece:
     columns = (arrivals.stamps_ns, arrivals.received_ns, arrivals.digests)
     return Piece(arrivals.topic, *(int(each[at]) for each in columns))
 
@@ -88,23 +96,23 @@ def covered(frames: Sequence[FramePlan], motion_ns: Stamps, lost: Counter[str]) 
 
 
 def stretches(
-    by_camera: Mapping[str, Sequence[FramePlan]], longest_s: float, lost: Counter[str]
+    by_sensor: Mapping[str, Sequence[FramePlan]], longest_s: float, lost: Counter[str]
 ) -> list[tuple[int, list[FramePlan]]]:
-    """Cut the frames of all cameras where one of them has a hole, and into parts of at most `longest_s`.
+    """Cut the frames of all sensors where one of them has a hole, and into parts of at most `longest_s`.
 
     Windows count frames, so no recording may have a hole. Each stretch comes with the number of its first frame, as
-    the first camera counts them. `lost` counts the frames of stretches of a single frame.
+    the first sensor counts them. `lost` counts the frames of stretches of a single frame.
     """
-    numbers, *others = [_stamps(frames) for frames in by_camera.values()]
+    numbers, *others = [_stamps(frames) for frames in by_sensor.values()]
     cuts_ns = {cut_ns for stamps_ns in (numbers, *others) for cut_ns in _holes(stamps_ns)}
-    everything = sorted((each for frames in by_camera.values() for each in frames), key=_order)
+    everything = sorted((each for frames in by_sensor.values() for each in frames), key=_order)
     stamps_ns = _stamps(everything)
     found = []
     for span_ns in _spans(stamps_ns, cuts_ns, longest_s):
         start, end = np.searchsorted(stamps_ns, span_ns)
         frames = everything[start:end]
-        counts = Counter(each.camera for each in frames)
-        if all(counts[camera] >= _LEAST_FRAMES for camera in by_camera):
+        counts = Counter(each.sensor for each in frames)
+        if all(counts[sensor] >= _LEAST_FRAMES for sensor in by_sensor):
             found.append((int(np.searchsorted(numbers, frames[0].stamp_ns)), frames))
         else:
             lost["alone between holes"] += len(frames)
@@ -124,7 +132,7 @@ def _spans(stamps_ns: Stamps, cuts_ns: Iterable[int], longest_s: float) -> Itera
 
 
 def _order(frame: FramePlan) -> tuple[int, str]:
-    return frame.stamp_ns, frame.camera
+    return frame.stamp_ns, frame.sensor
 
 
 def _holes(stamps_ns: Stamps) -> list[int]:

@@ -48,10 +48,9 @@ def _row(name: str, seen: Seen) -> tuple[str, ...]:
 
 
 def _note(seen: Seen) -> str:
-    if seen.kind == kinds.POINTS:
-        return "not used yet"
     if seen.kind not in (*kinds.STAMPED, kinds.TRANSFORMS):
         return "not used"
     if seen.stamps_ns and not any(seen.stamps_ns):
         return "header stamps are all zero"
-    return seen.fault or ("" if seen.shape is None else str(seen.shape))
+    told = seen.shape or seen.cloud
+    return seen.fault or ("" if told is None else str(told))

@@ -20,5 +20,6 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "right_info": (CAMERA_INFO,),
     "speed": (ODOMETRY, TWIST),
     "yaw_rate": (ODOMETRY, TWIST, IMU),
+    "cloud": (POINTS,),
     "tf": (TRANSFORMS,),
 }

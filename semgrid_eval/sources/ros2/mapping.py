@@ -1,4 +1,4 @@
-"""The map file: which topics of a bag are which camera, where cameras sit, and what tells the motion."""
+"""The map file: which topics of a bag are which camera or LiDAR, where they sit, and what tells the motion."""
 
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -11,6 +11,11 @@ from semgrid_eval.errors import InputError
 
 Topic = Annotated[str, Field(pattern=r"^/\S+$")]
 Positive = Annotated[float, Field(gt=0)]
+SensorName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+HIGHEST_PIXEL, HIGHEST_POINT = 255, 65_535
+"""Ids that the label of a pixel, and that of a point, can have."""
+Ids = dict[str, tuple[int, ...]]
+"""Ids by name of the Cityscapes label that they stand for."""
 
 
 class VehicleMap(Config):
@@ -50,7 +55,7 @@ class MotionMap(Config):
 
 
 class Extrinsics(Config):
-    """Where a camera sits in the vehicle frame; positive pitch looks down."""
+    """Where a sensor sits in the vehicle frame, its own axes ahead, left and up; positive pitch looks down."""
 
     x_m: float
     y_m: float
@@ -72,7 +77,7 @@ class CameraMap(Config):
     right_info: Topic | None = None
     baseline_m: Positive | None = None  # where no topic tells it; for depth any, it sets how finely depth is coded
     labels: Topic | None = None
-    ids: Literal["label_ids", "train_ids"] | dict[str, tuple[int, ...]] = "label_ids"
+    ids: Literal["label_ids", "train_ids"] | Ids = "label_ids"
     frame: str | None = None  # the camera's frame in tf, where messages name another
     extrinsics: Extrinsics | None = None  # None: tf tells them
 
@@ -89,11 +94,7 @@ class CameraMap(Config):
 
     @model_validator(mode="after")
     def _names_known_labels(self) -> Self:
-        for name, ids in self.ids.items() if isinstance(self.ids, dict) else ():
-            if name not in LABEL_ID:
-                raise ValueError(f"ids: {name!r} is not one of {', '.join(LABEL_ID)}")
-            if wrong := [each for each in ids if not 0 <= each <= 255]:
-                raise ValueError(f"ids: {wrong[0]} is not within 0 to 255")
+        _require_labels(self.ids, HIGHEST_PIXEL)
         return self
 
     @property
@@ -109,6 +110,30 @@ class CameraMap(Config):
         return {name: topic for name, topic in given.items() if topic is not None}
 
 
+class PointTimes(Config):
+    """Which field of a cloud tells when each point was measured."""
+
+    field: str
+    unit: Literal["s", "ms", "us", "ns"]
+    since: Literal["stamp", "epoch"] = "stamp"  # what it counts from: the stamp of its cloud, or 1970
+
+
+class LidarMap(Config):
+    """The topic of one LiDAR."""
+
+    cloud: Topic  # sensor_msgs/PointCloud2
+    times: PointTimes | None = None  # None: all points of a cloud are of one time
+    label_field: str | None = None  # None: points have no labels
+    ids: Literal["label_ids", "train_ids", "semantickitti"] | Ids = "label_ids"
+    frame: str | None = None  # the LiDAR's frame in tf, where messages name another
+    extrinsics: Extrinsics | None = None  # None: tf tells them
+
+    @model_validator(mode="after")
+    def _names_known_labels(self) -> Self:
+        _require_labels(self.ids, HIGHEST_POINT)
+        return self
+
+
 class BagMap(Config):
     """What a bag's topics are."""
 
@@ -116,7 +141,16 @@ class BagMap(Config):
     clock: Literal["header", "received"] = "header"  # whose stamps count: the messages', or the recorder's
     tolerance_s: float = Field(default=0.01, ge=0, le=1)  # pictures of one frame differ by no more
     motion: MotionMap
-    cameras: dict[Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")], CameraMap] = Field(min_length=1)
+    cameras: dict[SensorName, CameraMap] = Field(default_factory=dict)
+    lidars: dict[SensorName, LidarMap] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _names_sensors(self) -> Self:
+        if not self.cameras and not self.lidars:
+            raise ValueError("cameras or lidars: one is needed")
+        if same := self.cameras.keys() & self.lidars.keys():
+            raise ValueError(f"lidars: {min(same)!r} is the name of a camera already")
+        return self
 
 
 def load_map(path: Path) -> BagMap:
@@ -129,3 +163,12 @@ def load_map(path: Path) -> BagMap:
         message = "is missing; make a first one with: semgrid-eval convert ros2 BAG --inspect"
         raise InputError(message, path=path, field="map")
     return parse_config(BagMap, load_yaml(path), path=path)
+
+
+def _require_labels(ids: str | Ids, highest: int) -> None:
+    """Make sure that ids are given to labels of Cityscapes, and are not beyond what a label can hold."""
+    for name, given in ids.items() if isinstance(ids, dict) else ():
+        if name not in LABEL_ID:
+            raise ValueError(f"ids: {name!r} is not one of {', '.join(LABEL_ID)}")
+        if wrong := [each for each in given if not 0 <= each <= highest]:
+            raise ValueError(f"ids: {wrong[0]} is not within 0 to {highest}")

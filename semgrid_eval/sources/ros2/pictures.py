@@ -7,10 +7,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CITYSCAPES_LABELS, LABEL_ID, label_ids_from_train_ids
 from semgrid_eval.errors import InputError
 from semgrid_eval.recording.colour import decode_colour, kind_of, read_size
-from semgrid_eval.recording.png import decode_gray, decode_ids, encode, encode_gray
+from semgrid_eval.recording.png import decode_gray, decode_ids, encode
 
 Pixels = NDArray[np.uint8]
 _TO_BGR = {
@@ -34,7 +33,6 @@ _CODINGS = {
     "labels": ("mono8", "8UC1", "png"),
 }
 _DEPTH_HEADER_BYTES = 12  # of compressedDepth, before its PNG file
-_NO_LABEL = 255
 _MM = np.float32(0.001)
 
 
@@ -113,37 +111,6 @@ def ids_of(message: Any) -> Pixels:  # noqa: ANN401
     if not hasattr(message, "encoding"):
         return decode_ids(_file(message))
     return _raw(message).astype(np.uint8, copy=False)
-
-
-class LabelTable:
-    """Cityscapes label ids of the ids in label images, as the map file says."""
-
-    def __init__(self, ids: str | dict[str, tuple[int, ...]]) -> None:
-        self._table, self._known = np.zeros(256, np.uint8), np.zeros(256, np.bool_)
-        for name, given in _given(ids).items():
-            self._table[list(given)], self._known[list(given)] = LABEL_ID[name], True
-        if ids == "train_ids":
-            self._table = label_ids_from_train_ids()
-
-    def label_png(self, ids: Pixels) -> bytes:
-        """Return ids (H, W) as a PNG file of label ids.
-
-        Raises:
-            InputError: it holds an id that the map does not name.
-        """
-        strange = np.flatnonzero(np.bincount(ids.ravel(), minlength=256).astype(bool) & ~self._known)
-        if len(strange):
-            raise InputError(f"{strange[0]} is in a label image, but not in the map", field="ids")
-        return encode_gray(self._table[ids])
-
-
-def _given(ids: str | dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
-    if isinstance(ids, dict):
-        return ids
-    if ids == "label_ids":
-        return {label.name: (label.label_id,) for label in CITYSCAPES_LABELS if label.label_id >= 0}
-    trained = {label.name: (label.train_id,) for label in CITYSCAPES_LABELS if label.train_id != _NO_LABEL}
-    return {**trained, "unlabeled": (_NO_LABEL,)}
 
 
 def _raw(message: Any) -> NDArray[np.generic]:  # noqa: ANN401

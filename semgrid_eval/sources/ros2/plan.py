@@ -9,11 +9,12 @@ import numpy as np
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.sources.ros2.bag import Bag, name_of
-from semgrid_eval.sources.ros2.frames import FramePlan, covered, frames_of, stretches
+from semgrid_eval.sources.ros2.frames import FramePlan, covered, frames_of, stretches, sweeps_of
 from semgrid_eval.sources.ros2.kinds import IMU
+from semgrid_eval.sources.ros2.lidars import plan_lidar
 from semgrid_eval.sources.ros2.mapping import BagMap
 from semgrid_eval.sources.ros2.motion import Floats, Rates, rates_of
-from semgrid_eval.sources.ros2.recording import Stretch
+from semgrid_eval.sources.ros2.recording import AROUND_NS, Stretch
 from semgrid_eval.sources.ros2.rig import plan_rig
 from semgrid_eval.sources.ros2.scan import Facts, scan
 
@@ -32,7 +33,7 @@ class BagPlan:
 
     name: str
     stretches: list[Stretch] = field(default_factory=list)
-    frames: int = 0  # that have been recorded, of all cameras
+    frames: int = 0  # that have been recorded, of all cameras; sweeps of all LiDARs
     lost: Counter[str] = field(default_factory=Counter)  # frames that are left out, by what they lack
     repeated: int = 0  # messages with the stamp of another one
     fault: str = ""  # why there are no recordings
@@ -57,12 +58,20 @@ def plan_bag(path: Path, mapping: BagMap, cut: Cut) -> BagPlan:
 def _fill(plan: BagPlan, path: Path, mapping: BagMap, cut: Cut, facts: Facts) -> None:
     rates = _rates(mapping, facts)
     rigs = {name: plan_rig(camera, mapping.vehicle, facts) for name, camera in mapping.cameras.items()}
-    by_camera = _frames(plan, mapping, facts, rates)
+    lidars = {name: plan_lidar(lidar, mapping.vehicle, facts) for name, lidar in mapping.lidars.items()}
+    by_sensor = _frames(plan, mapping, facts, rates)
     stretch = partial(
-        Stretch, bag=path, split=cut.split, group=plan.name, clock=mapping.clock, kinds=facts.kinds, rigs=rigs
+        Stretch,
+        bag=path,
+        split=cut.split,
+        group=plan.name,
+        clock=mapping.clock,
+        kinds=facts.kinds,
+        rigs=rigs,
+        lidars=lidars,
     )
-    for first, frames in stretches(by_camera, cut.longest_s, plan.lost):
-        motion = rates.between(frames[0].stamp_ns, frames[-1].stamp_ns)
+    for first, frames in stretches(by_sensor, cut.longest_s, plan.lost):
+        motion = rates.between(frames[0].stamp_ns - AROUND_NS, frames[-1].stamp_ns + AROUND_NS)
         name = f"{plan.name}_{first:06d}"
         plan.stretches.append(stretch(name=name, frames=tuple(frames), motion=motion))
     if not plan.stretches:
@@ -70,12 +79,18 @@ def _fill(plan: BagPlan, path: Path, mapping: BagMap, cut: Cut, facts: Facts) ->
 
 
 def _frames(plan: BagPlan, mapping: BagMap, facts: Facts, rates: Rates) -> dict[str, list[FramePlan]]:
+    """Return the frames of all cameras and the sweeps of all LiDARs that can be used, in the order of the map."""
     found = {}
     for name, camera in mapping.cameras.items():
         whole = frames_of(name, camera, facts.arrivals, mapping.tolerance_s, plan.lost)
         found[name] = covered(whole, rates.stamps_ns, plan.lost)
         plan.frames += len(facts.arrivals[camera.depth_topic].stamps_ns)
+    for name, lidar in mapping.lidars.items():
+        sweeps = sweeps_of(name, facts.arrivals[lidar.cloud])
+        found[name] = covered(sweeps, rates.stamps_ns, plan.lost)
+        plan.frames += len(sweeps)
     used = {topic for camera in mapping.cameras.values() for topic in camera.pictures().values()}
+    used |= {lidar.cloud for lidar in mapping.lidars.values()}
     plan.repeated = sum(facts.arrivals[topic].repeated for topic in used)
     return found
 

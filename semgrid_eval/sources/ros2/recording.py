@@ -1,7 +1,7 @@
 """One stretch of a bag as a recording: the second pass, over its own part of the bag."""
 
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
@@ -10,14 +10,19 @@ from typing import Any
 
 from semgrid_eval.errors import InputError, located
 from semgrid_eval.files import digest_value
+from semgrid_eval.motion import EgoMotion
+from semgrid_eval.recording.lidar import LidarSweep
 from semgrid_eval.recording.types import CameraFrame, Moment, MotionSample, Recording
 from semgrid_eval.sources.ros2.bag import Arrival, Bag
-from semgrid_eval.sources.ros2.frames import FramePlan, Piece
+from semgrid_eval.sources.ros2.frames import CLOUD, FramePlan, Piece
+from semgrid_eval.sources.ros2.lidars import LONGEST_NS, LidarPlan, Sweeps
 from semgrid_eval.sources.ros2.rig import Rig, RigPlan
 from semgrid_eval.sources.ros2.scan import stamp_of
 
 DATASET = "ros2"
-_CONVERSION_VERSION = 1  # to be raised when the same bag gives another recording
+AROUND_NS = int(LONGEST_NS)
+"""How much of the motion before and after a stretch is kept: points of its sweeps may be of those times."""
+_CONVERSION_VERSION = 2  # to be raised when the same bag gives another recording
 
 
 @dataclass(frozen=True)
@@ -31,15 +36,17 @@ class Stretch:
     clock: str  # of the stamps: header or received
     kinds: dict[str, str]  # message types by topic
     rigs: dict[str, RigPlan]  # by camera
+    lidars: dict[str, LidarPlan]
     frames: tuple[FramePlan, ...]  # in the order of time
-    motion: tuple[MotionSample, ...]
+    motion: tuple[MotionSample, ...]  # from before the first frame to after the last one
 
     def digest(self) -> str:
-        """Digest what determines the content; pictures count by the digests of their messages."""
+        """Digest what determines the content; messages with pictures and points count by their digests."""
         rigs = {name: rig.described() for name, rig in self.rigs.items()}
+        lidars = {name: lidar.described() for name, lidar in self.lidars.items()}
         frames = [frame.described() for frame in self.frames]
         motion = [[each.stamp_ns, each.speed_mps, each.yaw_rate_radps] for each in self.motion]
-        return digest_value([_CONVERSION_VERSION, self.name, self.split, self.group, rigs, frames, motion])
+        return digest_value([_CONVERSION_VERSION, self.name, self.split, self.group, rigs, lidars, frames, motion])
 
     def recording(self) -> Recording:
         """Return the recording, which reads the bag while it is streamed."""
@@ -55,16 +62,43 @@ class Stretch:
 
 
 def moments(stretch: Stretch) -> Iterator[Moment]:
-    """Read the pictures of a stretch and make its moments; only messages that wait for others are in memory.
+    """Read the messages of a stretch and make its moments; only messages that wait for others are in memory.
 
     Raises:
-        InputError: the bag is not what it was in the first pass, or a picture is damaged.
+        InputError: the bag is not what it was in the first pass, or a picture or cloud is damaged.
     """
-    rigs = {name: Rig(plan) for name, plan in stretch.rigs.items()}
+    makers = _Makers(stretch)
     coming = deque(stretch.motion)
+    while len(coming) > 1 and coming[1].stamp_ns <= stretch.frames[0].stamp_ns:
+        coming.popleft()
     for stamp_ns, frames in groupby(_gathered(stretch), key=lambda each: each[0].stamp_ns):
-        cameras = {plan.camera: _made(stretch, rigs[plan.camera], plan, found) for plan, found in frames}
-        yield Moment(stamp_ns, cameras, tuple(_until(stamp_ns, coming)))
+        cameras, sweeps = makers.made(frames)
+        yield Moment(stamp_ns, cameras, tuple(_until(stamp_ns, coming)), sweeps=sweeps)
+    if coming and stretch.frames[-1].stamp_ns not in {each.stamp_ns for each in stretch.motion}:
+        yield Moment(coming[0].stamp_ns, {}, (coming[0],))  # motion covers all frames
+
+
+class _Makers:
+    """What makes frames and sweeps of a stretch's messages."""
+
+    def __init__(self, stretch: Stretch) -> None:
+        self._bag = stretch.bag
+        motion = EgoMotion(stretch.motion, "arc")
+        self._rigs = {name: Rig(plan) for name, plan in stretch.rigs.items()}
+        self._sweeps = {name: Sweeps(plan, motion) for name, plan in stretch.lidars.items()}
+
+    def made(
+        self, frames: Iterable[tuple[FramePlan, dict[str, Any]]]
+    ) -> tuple[dict[str, CameraFrame], dict[str, LidarSweep]]:
+        """Make what cameras and LiDARs saw at one time, by their names."""
+        cameras, sweeps = {}, {}
+        for plan, messages in frames:
+            with located(path=self._bag, field=f"{plan.sensor} at {plan.stamp_ns} ns"):
+                if plan.sensor in self._rigs:
+                    cameras[plan.sensor] = self._rigs[plan.sensor].frame(plan.stamp_ns, messages)
+                else:
+                    sweeps[plan.sensor] = self._sweeps[plan.sensor].sweep(plan.stamp_ns, messages[CLOUD])
+        return cameras, sweeps
 
 
 def _until(stamp_ns: int, coming: deque[MotionSample]) -> Iterator[MotionSample]:
@@ -72,13 +106,8 @@ def _until(stamp_ns: int, coming: deque[MotionSample]) -> Iterator[MotionSample]
         yield coming.popleft()
 
 
-def _made(stretch: Stretch, rig: Rig, plan: FramePlan, messages: dict[str, Any]) -> CameraFrame:
-    with located(path=stretch.bag, field=f"{plan.camera} at {plan.stamp_ns} ns"):
-        return rig.frame(plan.stamp_ns, messages)
-
-
 def _gathered(stretch: Stretch) -> Iterator[tuple[FramePlan, dict[str, Any]]]:
-    """Iterate over frames in their order, each with the messages of its pictures."""
+    """Iterate over frames in their order, each with its messages."""
     needed = Counter(_key(piece) for frame in stretch.frames for piece in frame.pieces.values())
     waiting: dict[tuple[str, int], Any] = {}
     remaining = iter(stretch.frames)

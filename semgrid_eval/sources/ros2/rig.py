@@ -14,6 +14,7 @@ from semgrid_eval.recording.types import CameraCalibration, CameraFrame
 from semgrid_eval.sources.matching import SemiGlobalMatching
 from semgrid_eval.sources.ros2 import pictures
 from semgrid_eval.sources.ros2.cameras import Info, Rectification, baseline_m, calibration_of
+from semgrid_eval.sources.ros2.labels import LabelTable
 from semgrid_eval.sources.ros2.mapping import CameraMap, Extrinsics, VehicleMap
 from semgrid_eval.sources.ros2.scan import Facts
 from semgrid_eval.sources.ros2.transforms import extrinsics_of
@@ -66,7 +67,7 @@ class Rig:
     def __init__(self, plan: RigPlan) -> None:
         self._camera, self._calibration = plan.camera, plan.calibration
         self._left = Rectification(plan.info, rectified=plan.camera.rectified)
-        self._labels = pictures.LabelTable(plan.camera.ids)
+        self._labels = LabelTable(plan.camera.ids)
         if plan.right_info is not None and plan.camera.right is not None:
             self._right = Rectification(plan.right_info, rectified=plan.camera.rectified)
             self._matching = SemiGlobalMatching(plan.calibration)
@@ -89,7 +90,7 @@ class Rig:
         return encode(self._left.apply(pictures.colour(message), "bilinear"))
 
     def _label_png(self, message: Any) -> bytes:  # noqa: ANN401
-        return self._labels.label_png(self._left.apply(pictures.ids_of(message), "nearest"))
+        return encode_gray(self._labels.label_ids(self._left.apply(pictures.ids_of(message), "nearest")))
 
     def _disparity_px(self, messages: Mapping[str, Any]) -> Disparity:
         """Return the disparity (H, W); 0 where there is none."""

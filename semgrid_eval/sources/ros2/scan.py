@@ -1,4 +1,4 @@
-"""The first pass over a bag: what each mapped topic holds, without its pictures, which are left for the second."""
+"""The first pass over a bag: what each mapped topic holds, but for pixels and points, left for the second."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -10,6 +10,7 @@ from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.arrivals import Arrivals, Ledger
 from semgrid_eval.sources.ros2.bag import Arrival, Bag
 from semgrid_eval.sources.ros2.cameras import Info
+from semgrid_eval.sources.ros2.clouds import require_layout
 from semgrid_eval.sources.ros2.mapping import BagMap
 from semgrid_eval.sources.ros2.motion import Track, values_of
 from semgrid_eval.sources.ros2.pictures import Shape, require_coding, shape_of
@@ -36,7 +37,7 @@ class Stereo(NamedTuple):
 class Facts:
     """What a bag holds, by topic."""
 
-    arrivals: dict[str, Arrivals] = field(default_factory=dict)  # of pictures and motion
+    arrivals: dict[str, Arrivals] = field(default_factory=dict)  # of pictures, clouds and motion
     shapes: dict[str, Shape] = field(default_factory=dict)
     frames: dict[str, str] = field(default_factory=dict)  # the frame that the first message names
     infos: dict[str, Info] = field(default_factory=dict)
@@ -55,6 +56,7 @@ def uses_of(mapping: BagMap) -> Iterator[Use]:
         yield Use(camera.info, "info")
         if camera.right_info is not None:
             yield Use(camera.right_info, "right_info")
+    yield from (Use(lidar.cloud, "cloud") for lidar in mapping.lidars.values())
 
 
 def scan(bag: Bag, mapping: BagMap) -> Facts:
@@ -117,6 +119,8 @@ class _Scanner:
         for name in names:
             if is_motion:
                 self._motion(arrival.topic, name, stamp_ns, message)
+            elif name == "cloud":
+                self._cloud(arrival.topic, stamp_ns, message)
             else:
                 self._picture(arrival.topic, name, stamp_ns, message)
 
@@ -142,6 +146,12 @@ class _Scanner:
             stereo = Stereo(float(message.f), abs(float(message.t)))
             if self._facts.stereo.setdefault(topic, stereo) != stereo:
                 raise InputError(f"changes f or t at {stamp_ns} ns; a recording has one calibration", field=topic)
+
+    def _cloud(self, topic: str, stamp_ns: int, message: Any) -> None:  # noqa: ANN401
+        with located(field=f"{topic} at {stamp_ns} ns"):
+            for lidar in self._mapping.lidars.values():
+                if lidar.cloud == topic:
+                    require_layout(message, lidar)
 
 
 def stamp_of(message: Any) -> int:  # noqa: ANN401

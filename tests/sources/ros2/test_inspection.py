@@ -2,11 +2,9 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
-from support.bags import IMAGE, RecordingBag, Sent, Variant, write_bag
-from support.ros_messages import kind
+from support.bags import IMAGE, RecordingBag, Variant, write_bag
 from support.toy_world import street
 
 from semgrid_eval.cli.main import cli
@@ -47,16 +45,6 @@ def test_topics_are_listed_with_rate_and_offset(tmp_path):
     assert " ".join(row(said, "/labels")) == "/labels sensor_msgs/msg/Image 5 17 5.0 mono8 of 256 x 128"
     assert row(said, "/odom") == ["/odom", "nav_msgs/msg/Odometry", "5", "17", "4.0"]
     assert row(said, "/tf_static")[2:] == ["1", "-", "-"]
-
-
-def test_point_clouds_are_said_not_to_be_used_yet(tmp_path):
-    messages = list(RecordingBag(WORLD.recording()).messages())
-    head = next(each.message.header for each in messages if each.topic == "/odom")
-    data = {"height": 1, "width": 1, "fields": [], "is_bigendian": False, "point_step": 12, "row_step": 12}
-    cloud = kind("sensor_msgs/PointCloud2")(header=head, **data, data=np.zeros(12, np.uint8), is_dense=True)
-    said, text = inspected(tmp_path, [*messages, Sent("/lidar", messages[-1].received_ns, cloud)])
-    assert " ".join(row(said, "/lidar")).endswith("not used yet")
-    assert "/lidar" not in text
 
 
 def test_what_nothing_links_is_left_to_be_measured(tmp_path):

@@ -5,10 +5,8 @@ import numpy as np
 import pytest
 from support.ros_messages import compressed, image
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import InputError
-from semgrid_eval.recording.png import decode_gray
-from semgrid_eval.sources.ros2.pictures import LabelTable, Shape, colour, depth_m, ids_of, shape_of
+from semgrid_eval.sources.ros2.pictures import Shape, colour, depth_m, shape_of
 
 RNG = np.random.default_rng(4)
 BGR = RNG.integers(0, 256, (5, 7, 3), dtype=np.uint8)
@@ -48,23 +46,3 @@ def test_bytes_that_do_not_make_the_picture_are_refused():
     for broken in (replace(message, data=message.data[:-1]), replace(message, step=20), replace(message, height=6)):
         with pytest.raises(InputError, match=r"data: \d+ bytes in lines of \d+ are not 7 x \d of bgr8"):
             colour(broken)
-
-
-@pytest.mark.parametrize(
-    ("ids", "given", "expected"),
-    [
-        ("label_ids", [7, 26], ["road", "car"]),
-        ("train_ids", [0, 13, 255], ["road", "car", "unlabeled"]),
-        ({"road": (3, 4), "person": (9,)}, [3, 4, 9], ["road", "road", "person"]),
-    ],
-)
-def test_ids_become_label_ids(ids, given, expected):
-    picture = ids_of(image(1, np.array([given], np.uint8), "mono8"))
-    found = decode_gray(LabelTable(ids).label_png(picture), bit_depth=8)
-    assert found.tolist() == [[LABEL_ID[name] for name in expected]]
-
-
-@pytest.mark.parametrize(("ids", "strange"), [("label_ids", 34), ("train_ids", 19), ({"road": (1,)}, 0)])
-def test_ids_that_are_not_named_are_refused(ids, strange):
-    with pytest.raises(InputError, match=f"ids: {strange} is in a label image, but not in the map"):
-        LabelTable(ids).label_png(np.array([[strange]], np.uint8))

@@ -1,4 +1,7 @@
-"""Bags of real recordings, where a folder of them is named by SEMGRID_REAL_DATA, and of a town's stereo pairs."""
+"""Bags of real recordings, where folders of them are named, and of a town's stereo pairs.
+
+SEMGRID_REAL_DATA names a tree in Cityscapes' layout, SEMGRID_REAL_LIDAR one of SemanticKITTI.
+"""
 
 import os
 from pathlib import Path
@@ -6,19 +9,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.bags import RecordingBag, Variant
+from support.rig_bags import Coding, RigBag
 from support.town_pairs import matched_drive
 from support.towns import small_plans
 
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
-from semgrid_eval.log.store import find_logs, write_log
+from semgrid_eval.log.store import find_logs, read_recording, write_log
 from semgrid_eval.recording.png import decode_gray
+from semgrid_eval.sensors.lidar import LidarSensor
 from semgrid_eval.sources.cityscapes.tree import CityscapesOptions, find_sequences
+from semgrid_eval.sources.kitti.convert import convert_kitti
+from semgrid_eval.sources.kitti.source import KittiOptions
 from semgrid_eval.sources.ros2.convert import convert_bags
 from semgrid_eval.sources.ros2.options import Ros2Options
 
-REAL = os.environ.get("SEMGRID_REAL_DATA", "")
+REAL, REAL_LIDAR = (os.environ.get(f"SEMGRID_REAL_{name}", "") for name in ("DATA", "LIDAR"))
 
 
 def converted(here, bag):
@@ -41,6 +48,25 @@ def test_grids_of_a_real_bag_are_those_of_its_tree(tmp_path, variant):
     write_log(recording, tmp_path / "tree.mcap")
     logs = (tmp_path / "tree.mcap", converted(tmp_path, RecordingBag(recording, variant)))
     expected, found = (build_log(log, GridConfig())[0].grids for log in logs)
+    assert (expected > 0).mean() > 0.05
+    assert np.array_equal(found, expected)
+
+
+@pytest.mark.skipif(not Path(REAL_LIDAR, "sequences").is_dir(), reason="SEMGRID_REAL_LIDAR names no SemanticKITTI")
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_lidar_grids_of_a_real_bag_are_those_of_its_files(tmp_path, storage):
+    convert_kitti(KittiOptions(src=Path(REAL_LIDAR), sequence=("07",)), tmp_path / "kitti")
+    (files,) = find_logs(tmp_path / "kitti")
+    recording = read_recording(files)
+    labels = sorted(Path(REAL_LIDAR, "sequences", "07", "labels").glob("*.label"))
+    stamps_ns = [moment.stamp_ns for moment in recording.moments()]
+    raw = dict(zip(stamps_ns, (np.fromfile(path, "<u4") for path in labels), strict=True))
+    bag = RigBag(recording, Coding(labels="u4"), raw)
+    bag.write(tmp_path / "drive", storage)
+    (tmp_path / "map.yaml").write_text(bag.map_text(ids="semantickitti"))
+    convert_bags(Ros2Options(bag=(tmp_path / "drive",), map=str(tmp_path / "map.yaml")), tmp_path / "logs")
+    config = GridConfig(sensors={"top": LidarSensor()}, target=("top",))
+    found, expected = (build_log(log, config)[0].grids for log in (*find_logs(tmp_path / "logs"), files))
     assert (expected > 0).mean() > 0.05
     assert np.array_equal(found, expected)
 

@@ -1,10 +1,12 @@
 """All kinds of bad inputs."""
 
 from support.bad import (
+    bags,
     cityscapes,
     commands,
     containers,
     contracts,
+    drives,
     latencies,
     logs,
     matrices,
@@ -21,6 +23,6 @@ KINDS = (
     *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, matrices.STREAM, on_logs.KIND),
     *latencies.KINDS,
     *(own_models.MODEL, predictions.KIND, contracts.CONTRACT),
-    *cityscapes.KINDS,
+    *(*cityscapes.KINDS, *bags.KINDS, *drives.KINDS),
     *(logs.KIND, containers.KIND, networks.KIND, results.KIND, commands.KIND, surroundings.KIND),
 )

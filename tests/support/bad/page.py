@@ -35,7 +35,7 @@ def page_text(lines: Mapping[tuple[str, str], str], kinds: tuple[Kind, ...]) -> 
 
 def versions() -> str:
     """Say which versions of what is quoted are installed here."""
-    quoted = (f"{name} {version(name)}" for name in ("click", "onnxruntime", "PyYAML", "pydantic"))
+    quoted = (f"{name} {version(name)}" for name in ("click", "onnxruntime", "PyYAML", "pydantic", "rosbags"))
     return f"Python {sys.version_info[0]}.{sys.version_info[1]}, {', '.join(quoted)}"
 
 

@@ -1,0 +1,91 @@
+"""Point clouds in messages: their fields by name, as columns of one row a point."""
+
+from collections.abc import Iterable
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.errors import InputError
+from semgrid_eval.recording.lidar import MAX_POINTS
+from semgrid_eval.sources.ros2.mapping import LidarMap
+
+PLACE = ("x", "y", "z")
+INTENSITY = "intensity"
+MAX_POINT_BYTES = 1024
+_TYPES = dict(enumerate(("int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"), start=1))
+"""Names of numbers by what a PointField calls them."""
+NUMBERS, WHOLE = tuple(_TYPES.values()), ("int8", "uint8", "int16", "uint16", "int32", "uint32")
+_REAL = ("float32", "float64")
+
+
+def type_of(field: Any) -> str:  # noqa: ANN401 - a class that rosbags makes
+    """Return the type of a field's numbers, with their count where there is more than one in a point."""
+    name = _TYPES.get(field.datatype, f"datatype {field.datatype}")
+    return name if field.count <= 1 else f"{field.count} x {name}"
+
+
+def require_layout(message: Any, lidar: LidarMap) -> None:  # noqa: ANN401
+    """Make sure that a cloud has the fields that are read, and the bytes that it says, before any array is made.
+
+    Raises:
+        InputError: it has not.
+    """
+    fields = {field.name: field for field in message.fields}
+    for name, types in _read_fields(lidar, fields).items():
+        if name not in fields:
+            raise InputError(f"has no field {name}; there are: {', '.join(fields) or 'none'}")
+        if type_of(fields[name]) not in types:
+            raise InputError(f"{name} is {type_of(fields[name])}; it is read from {', '.join(types)}")
+        if fields[name].offset + np.dtype(type_of(fields[name])).itemsize > message.point_step:
+            place = f"{name} begins at byte {fields[name].offset}"
+            raise InputError(f"{place} and reaches beyond a point of {message.point_step} bytes")
+    _require_size(message)
+
+
+def columns_of(message: Any, lidar: LidarMap) -> NDArray[np.void]:  # noqa: ANN401
+    """Return the fields that are read (N,), row after row of an organised cloud, whatever rows end with.
+
+    Raises:
+        InputError: as `require_layout` does.
+    """
+    require_layout(message, lidar)
+    fields = {field.name: field for field in message.fields}
+    names = list(_read_fields(lidar, fields))
+    order: Literal[">", "<"] = ">" if message.is_bigendian else "<"
+    layout: Any = {
+        "names": names,
+        "formats": [np.dtype(type_of(fields[name])).newbyteorder(order) for name in names],
+        "offsets": [fields[name].offset for name in names],
+        "itemsize": message.point_step,
+    }
+    rows = np.asarray(message.data, np.uint8).reshape(message.height, message.row_step)
+    used = np.ascontiguousarray(rows[:, : message.width * message.point_step])
+    points: NDArray[np.void] = used.reshape(-1, message.point_step).view(np.dtype(layout))[:, 0]
+    return points
+
+
+def _read_fields(lidar: LidarMap, present: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Return the fields that are read, each with the types that it may have."""
+    found: dict[str, tuple[str, ...]] = dict.fromkeys(PLACE, _REAL)
+    if INTENSITY in present:
+        found[INTENSITY] = NUMBERS
+    if lidar.label_field is not None:
+        found[lidar.label_field] = WHOLE
+    if lidar.times is not None:
+        found[lidar.times.field] = NUMBERS
+    return found
+
+
+def _require_size(message: Any) -> None:  # noqa: ANN401
+    count = message.width * message.height
+    if count > MAX_POINTS:
+        raise InputError(f"has {message.width} x {message.height} points; at most {MAX_POINTS} are allowed")
+    if message.point_step > MAX_POINT_BYTES:
+        raise InputError(f"has points of {message.point_step} bytes; at most {MAX_POINT_BYTES} are allowed")
+    row_bytes = message.width * message.point_step
+    if message.row_step < row_bytes:
+        raise InputError(f"row_step {message.row_step} is less than {message.width} points of {message.point_step}")
+    if len(message.data) != message.row_step * message.height:
+        told = f"{message.height} rows of {message.row_step}"
+        raise InputError(f"has {len(message.data)} bytes, which are not {told}")

@@ -1,0 +1,57 @@
+"""The LiDARs of a first map file, guessed from the first clouds of a bag."""
+
+import re
+from collections.abc import Iterator
+
+from semgrid_eval.sources.ros2.clouds_seen import CloudSeen
+from semgrid_eval.sources.ros2.contents import Contents, Seen
+
+_ONLY = "top"
+_GENERIC = {"points", "points_raw", "point_cloud", "pointcloud", "cloud", "packets", "lidar", "sensing"}
+
+
+def draft_lidars(contents: Contents, vehicle: str) -> Iterator[str]:
+    """Write a block for each topic of clouds that can be read, but for those that are made of a camera's pictures."""
+    clouds = {name: seen for name, seen in contents.topics.items() if seen.cloud is not None}
+    pictured = {seen.frame for seen in contents.topics.values() if seen.shape is not None}
+    swept = {name: seen for name, seen in clouds.items() if seen.frame not in pictured}
+    if swept:
+        yield "lidars:"
+    for name, (topic, seen) in zip(_names(list(swept)), swept.items(), strict=True):
+        assert seen.cloud is not None
+        yield f"  {name}:"
+        yield f"    cloud: {topic}"
+        yield from _fields(seen.cloud)
+        yield from _place(contents, seen, vehicle)
+    for topic in sorted(clouds.keys() - swept.keys()):
+        yield f"# {topic} has the frame of a camera, as points made of its pictures have: left out."
+
+
+def _names(topics: list[str]) -> list[str]:
+    """Name LiDARs by what is particular in their topics."""
+    if len(topics) == 1:
+        return [_ONLY]
+    parts = [[part for part in re.findall(r"[A-Za-z0-9_-]+", topic) if part not in _GENERIC] for topic in topics]
+    names = ["_".join(each) or f"lidar{number}" for number, each in enumerate(parts, start=1)]
+    return names if len(set(names)) == len(names) else [f"lidar{number}" for number in range(1, len(topics) + 1)]
+
+
+def _fields(cloud: CloudSeen) -> Iterator[str]:
+    if cloud.times is None:
+        yield "    # no times of points: all of a cloud count as measured at its stamp"
+    else:
+        times = cloud.times
+        yield f"    times: {{field: {times.field}, unit: {times.unit}, since: {times.since}}}  # of each point"
+    if cloud.label_field is None:
+        yield "    # no labels of points: a camera can colour them, `colour_from` of the sensor in a grid"
+    else:
+        yield f"    label_field: {cloud.label_field}"
+        yield f"    ids: {cloud.ids}  # the first cloud holds ids up to {cloud.highest_id}; or names: {{road: [40]}}"
+
+
+def _place(contents: Contents, seen: Seen, vehicle: str) -> Iterator[str]:
+    if seen.frame == vehicle or contents.transforms.has(vehicle, seen.frame):
+        yield f"    # extrinsics: from tf, {vehicle} to {seen.frame}"
+    else:
+        yield f"    # Nothing in the bag links {vehicle} to {seen.frame or 'the LiDAR'}: measure where it sits."
+        yield "    extrinsics: {x_m: , y_m: , z_m: , roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0}"
