@@ -76,9 +76,9 @@ def test_missing_labels_and_images_are_counted(tmp_path):
     assert findings(tmp_path, change) == {
         f"/camera/front/{channel}: missing_beside": (
             Severity.WARNING,
-            f"is missing for {count} of 8 messages of /camera/front/disparity (allowed: at most 0)",
+            f"is missing{hint} for {count} of 8 messages of /camera/front/disparity (allowed: at most 0)",
         )
-        for channel, count in (("label", 3), ("image", 5))
+        for channel, hint, count in (("label", " (`semgrid-eval segment` adds it)", 3), ("image", "", 5))
     }
 
 
