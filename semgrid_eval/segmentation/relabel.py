@@ -56,7 +56,8 @@ def segment_logs(
     parts = sorted(path for path in model.parent.glob(f"{escape(model.name)}*") if path.is_file())
     recipe = _Recipe(model, digest_files(parts), config, network.class_map, network.device)
     summary = convert_jobs([_job(path, recipe) for path in paths], out, work, label="segment")
-    summary.remark = f"labels: {model.name} on {network.device}, its classes by the map {network.class_map.name}"
+    if summary.written or summary.skipped:
+        summary.remark = f"labels: {model.name} on {network.device}, its classes by the map {network.class_map.name}"
     return summary
 
 
