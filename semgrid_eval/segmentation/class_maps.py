@@ -1,6 +1,7 @@
 """What a network's classes are among Cityscapes' labels: maps that ship with the package, and files of one's own."""
 
 import os
+import re
 from dataclasses import dataclass
 from importlib import resources
 from itertools import takewhile
@@ -19,6 +20,7 @@ _IN_FILES = ("mapillary", "ade20k")
 NAMES = (CITYSCAPES, CITYSCAPES_IDS, *_IN_FILES)
 """Maps that ship with the package."""
 _MOST = 255  # classes: the id 255 is void
+_INDEX = re.compile(r"0|[1-9][0-9]{0,2}")
 _UNLABELED = LABEL_ID["unlabeled"]
 
 
@@ -93,11 +95,11 @@ def _read(path: Path, name: str) -> ClassMap:
 
 def _in_order(path: Path, file: _File) -> tuple[str, ...]:
     """Return the classes in the order of outputs: as they stand there, or by their indices."""
-    indices = [int(key) for key in file.classes if key.isdecimal()]
+    indices = [int(key) for key in file.classes if _INDEX.fullmatch(key)]
     if not indices:
         return tuple(file.classes)
     if len(indices) != len(file.classes):
-        named = next(key for key in file.classes if not key.isdecimal())
+        named = next(key for key in file.classes if not _INDEX.fullmatch(key))
         fault = f"{shown(named)} is a name beside indices; without base, all are names, or all are indices"
         raise ConfigError(fault, path=path, field="classes")
     if gaps := set(range(len(indices))) - set(indices):
@@ -112,7 +114,7 @@ def _changed(path: Path, name: str, file: _File) -> ClassMap:
     base = find_class_map(file.base)
     labels = dict(zip(base.classes, base.labels, strict=True))
     for key, label in file.classes.items():
-        found = base.classes[int(key)] if key.isdecimal() and int(key) < len(base.classes) else key
+        found = base.classes[int(key)] if _INDEX.fullmatch(key) and int(key) < len(base.classes) else key
         if found not in labels:
             raise ConfigError(f"{file.base}: {not_one_of(key, base.classes)}", path=path, field="classes")
         labels[found] = label

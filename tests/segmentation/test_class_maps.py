@@ -96,6 +96,7 @@ def test_base_gives_what_is_not_named(own):
         ("classes: {street: rode, wheels: car}", "classes.street: 'rode' is not one of .*; did you mean road"),
         ("classes: {street: road}", "classes: has 1 classes; 2 to 255 are possible"),
         ('classes: {"0": road, "2": car}', "classes: index 1 is missing"),
+        ('classes: {"00": road, "1": car}', "classes: '00' is a name beside indices"),
         ('classes: {"0": road, wheels: car}', "classes: 'wheels' is a name beside indices"),
         ("{base: kitti, classes: {}}", "base: 'kitti' is not one of cityscapes, "),
         ("{base: ade20k, classes: {gras: road}}", "classes: ade20k: 'gras' is not one of .*; did you mean grass"),
