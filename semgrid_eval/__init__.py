@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from semgrid_eval.api import build_grids as build_grids
+    from semgrid_eval.api import check_log as check_log
     from semgrid_eval.api import convert as convert
     from semgrid_eval.api import find_logs as find_logs
     from semgrid_eval.api import fit as fit
@@ -18,9 +19,11 @@ if TYPE_CHECKING:
     from semgrid_eval.api import plot_grid as plot_grid
     from semgrid_eval.api import run as run
     from semgrid_eval.api import score as score
+    from semgrid_eval.api import write_log as write_log
     from semgrid_eval.api import write_report as write_report
     from semgrid_eval.classes import CLASS_NAMES as CLASS_NAMES
     from semgrid_eval.classes import CLASSES as CLASSES
+    from semgrid_eval.classes import LABEL_ID as LABEL_ID
     from semgrid_eval.config import Config as Config
     from semgrid_eval.errors import SemgridError as SemgridError
     from semgrid_eval.grids.recording import GridRecording as GridRecording
@@ -36,6 +39,17 @@ if TYPE_CHECKING:
     from semgrid_eval.models.network import input_planes as input_planes
     from semgrid_eval.playback.export import export_predictions as export_predictions
     from semgrid_eval.playback.export import write_predictions as write_predictions
+    from semgrid_eval.recording.disparity import coded_disparity as coded_disparity
+    from semgrid_eval.recording.lidar import LidarSweep as LidarSweep
+    from semgrid_eval.recording.lidar import Mount as Mount
+    from semgrid_eval.recording.png import encode_gray as encode_gray
+    from semgrid_eval.recording.types import Actor as Actor
+    from semgrid_eval.recording.types import CameraCalibration as CameraCalibration
+    from semgrid_eval.recording.types import CameraFrame as CameraFrame
+    from semgrid_eval.recording.types import Moment as Moment
+    from semgrid_eval.recording.types import MotionSample as MotionSample
+    from semgrid_eval.recording.types import Pose as Pose
+    from semgrid_eval.recording.types import Recording as Recording
     from semgrid_eval.scores.evaluate import Evaluation as Evaluation
     from semgrid_eval.scores.evaluate import evaluate as evaluate
     from semgrid_eval.scores.tidy import tidy as tidy
@@ -44,9 +58,9 @@ if TYPE_CHECKING:
     from semgrid_eval.windows.plan import WindowConfig as WindowConfig
 
 _NAMES = {
-    "api": "build_grids convert find_logs fit load_run make_model make_windows open_log plot_grid "
-    "run score write_report",
-    "classes": "CLASSES CLASS_NAMES",
+    "api": "build_grids check_log convert find_logs fit load_run make_model make_windows open_log plot_grid "
+    "run score write_log write_report",
+    "classes": "CLASSES CLASS_NAMES LABEL_ID",
     "config": "Config",
     "errors": "SemgridError",
     "grids.recording": "GridRecording",
@@ -55,6 +69,10 @@ _NAMES = {
     "models.model": "Baseline Given Model one_hot",
     "models.network": "Network NetworkSettings input_planes",
     "playback.export": "export_predictions write_predictions",
+    "recording.disparity": "coded_disparity",
+    "recording.lidar": "LidarSweep Mount",
+    "recording.png": "encode_gray",
+    "recording.types": "Actor CameraCalibration CameraFrame Moment MotionSample Pose Recording",
     "scores.evaluate": "Evaluation evaluate",
     "scores.tidy": "tidy",
     "windows.data": "WindowBatch WindowSet",

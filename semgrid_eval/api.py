@@ -15,8 +15,9 @@ from semgrid_eval.executors import local_executor
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.recording import GridRecording
 from semgrid_eval.grids.spec import GridConfig, GridSpec
-from semgrid_eval.log import store
+from semgrid_eval.log import check, store
 from semgrid_eval.log.convert import ConversionSummary, Work
+from semgrid_eval.log.findings import LogReport
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.models import registry
 from semgrid_eval.models.device import choose_device, settle_process
@@ -24,6 +25,7 @@ from semgrid_eval.models.memory import guest_limits
 from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.network import Network, seeded_network
 from semgrid_eval.models.training import train
+from semgrid_eval.recording.types import Recording
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores.metrics.iou import confusion
@@ -68,6 +70,16 @@ def open_log(path: Path | str) -> LogReader:
         LogError: the file cannot be read, is damaged, or is not a log of this package.
     """
     return LogReader(Path(path))
+
+
+def write_log(recording: Recording, path: Path | str) -> None:
+    """Write a recording of whatever source as a log, moment by moment; an InputError leaves nothing behind."""
+    store.write_log(recording, Path(path))
+
+
+def check_log(path: Path | str) -> LogReport:
+    """Check a log as `semgrid-eval check` does; what is wrong with it is a finding, no exception."""
+    return check.check_log(Path(path))
 
 
 def find_logs(folder: Path | str) -> list[Path]:

@@ -9,19 +9,16 @@ from semgrid_eval.log.container import damage_as_log_error
 from semgrid_eval.log.contract import Contract, TopicContract, topics_of
 from semgrid_eval.log.default_contract import default_contract
 from semgrid_eval.log.findings import Finding, LogReport, Severity, bounded, error
-from semgrid_eval.log.quantities import Extents, camera_extents, lidar_extents, motion_extents
+from semgrid_eval.log.quantities import Extents, camera_extents, lidar_extents, motion_extents, truth_faults
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.stamps import stamp_of
 from semgrid_eval.log.timing import Timeline, Times, coverage, judged, latencies, timing
-from semgrid_eval.log.topics import camera_topic
+from semgrid_eval.log.topics import camera_topic, lidar_topic
 from semgrid_eval.recording.types import Quantity
 
-_NEEDED = {
-    topics.DISPARITY: "foxglove.CompressedImage",
-    topics.CALIBRATION: "foxglove.CameraCalibration",
-    topics.STEREO: "semgrid.v1.StereoCalibration",
-}
-"""Channels of a camera, and the types of their messages, without which its pictures cannot be looked at."""
+_NEEDED = (topics.DISPARITY, topics.CALIBRATION, topics.STEREO)
+"""Channels of a camera without which its pictures cannot be looked at."""
+_TRUTH = {topics.TRUE_POSE, topics.TRUE_ACTORS}
 _HINTS = {"label_id": "; are they train ids?"}
 
 
@@ -78,9 +75,12 @@ def _findings(log: LogReader, contract: Contract, timeline: Timeline) -> Iterato
     yield from judged(contract.sensors, "sensors", sensors, f"there are {sensors}")
     duration_s = _duration_s(timeline)
     yield from judged(contract.duration_s, "duration_s", duration_s, f"is {duration_s:g} s")
+    wrong = log.wrong_types()
+    yield from (error(f"{topic}: type", fault) for topic, fault in wrong.items())
     for name, expected in contract.topics.items():
         for camera, topic in topics_of(name, cameras).items():
-            yield from _type(topic, expected, log.schemas())
+            if topic not in wrong:
+                yield from _type(topic, expected, log.schemas())
             yield from timing(topic, expected, timeline, camera)
             yield from coverage(topic, expected, timeline, cameras)
     yield from latencies(contract, timeline, cameras)
@@ -96,16 +96,18 @@ def _type(topic: str, expected: TopicContract, schemas: dict[str, str]) -> Itera
 
 def _extents(log: LogReader, timeline: Timeline) -> Generator[Finding, None, Extents]:
     """Measure motion and cameras; what a camera lacks to be looked at is an error, whatever the contract says."""
-    found = motion_extents(log.motion())
-    schemas = log.schemas()
+    wrong = log.wrong_types()
+    found = {} if topics.EGO_MOTION in wrong else motion_extents(log.motion())
+    yield from () if wrong.keys() & _TRUTH else truth_faults(log)
     for camera in log.scene.cameras:
-        needed = {camera_topic(camera, channel): schema for channel, schema in _NEEDED.items()}
-        lacking = [topic for topic, schema in needed.items() if schemas.get(topic) != schema or not timeline[topic]]
+        needed = [camera_topic(camera, channel) for channel in _NEEDED]
+        shown = {*needed, *(camera_topic(camera, channel) for channel in topics.PICTURE_FIELDS)}
+        lacking = [topic for topic in needed if not timeline.get(topic)] + sorted(shown & wrong.keys())
         if lacking:
             yield error(f"camera {camera}", f"cannot be looked at without proper messages of {', '.join(lacking)}")
         else:
             found |= yield from camera_extents(log, camera)
-    for lidar in log.lidars:
+    for lidar in (each for each in log.lidars if lidar_topic(each) not in wrong):
         found |= lidar_extents(log, lidar)
     return found
 

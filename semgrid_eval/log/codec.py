@@ -34,6 +34,10 @@ RECORD = "semgrid.scene"
 """The metadata record that says what a log is as a whole."""
 CONDITIONS_RECORD = "semgrid.conditions"
 """The metadata record of a recording's conditions, each as `0.31 px`; only where the source has some to tell."""
+PREDICTIONS_RECORD = "semgrid.predictions"
+"""The metadata record of a log that holds predictions of one recording."""
+PLAYBACK_RECORD = "semgrid.playback"
+"""The metadata record of a run's log to play."""
 FORMAT_VERSION = 1
 _NS_PER_S = 1_000_000_000
 _MAX_STAMP_NS = 1 << 63

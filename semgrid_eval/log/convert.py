@@ -123,6 +123,11 @@ def _note(outcome: _Outcome | WorkerDied, label: str, summary: ConversionSummary
         (summary.written if outcome.written else summary.skipped).append(label)
 
 
+def how_to_label(out: Path) -> str:
+    """Say, at the end of a source's remark, how logs without label images get them."""
+    return f"add them with semgrid-eval segment {out} --model NETWORK.onnx --out LABELLED"
+
+
 def _convert(job: ConversionJob, out: Path) -> _Outcome:
     path = out / job.split / f"{job.name}{SUFFIX}"
     try:

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.files import atomic_file
-from semgrid_eval.log.codec import stamp_ns, timestamp
+from semgrid_eval.log.codec import PREDICTIONS_RECORD, stamp_ns, timestamp
 from semgrid_eval.log.container import MAX_STAMP_NS, Container, Entry
 from semgrid_eval.log.grids import CLASSES, GridPlace, exact_message
 from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
 from semgrid_eval.log.topics import GRID_PREDICTION
 from semgrid_eval.log.writer import MessageWriter
 
-RECORD, RECORDING = "semgrid.predictions", "recording"
-"""The metadata record of a log of predictions, and its entry that names the recording which they belong to."""
+RECORDING = "recording"
+"""The entry of its metadata record that names the recording which the predictions belong to."""
 SCHEMA = SemanticGrid.DESCRIPTOR.full_name
 TOPIC = f"{GRID_PREDICTION}/exact"
 """Where `write_predictions` writes."""
@@ -64,7 +64,7 @@ def write_predictions(path: Path, predictions: Iterable[Prediction], recording: 
     """
     count, before_ns = 0, 0
     with atomic_file(path) as stream, MessageWriter(stream) as writer:
-        writer.metadata(RECORD, {RECORDING: recording})
+        writer.metadata(PREDICTIONS_RECORD, {RECORDING: recording})
         for prediction in predictions:
             fault = _fault_of_values(prediction, extent) or _fault_of_times(prediction, before_ns)
             if fault:
@@ -87,9 +87,9 @@ class PredictionLog(Container):
         super().__init__(path)
         self._wanted = topic
         try:
-            record = self.metadata(RECORD)
+            record = self.metadata(PREDICTIONS_RECORD)
             if record is not None and not record.get(RECORDING):
-                raise LogError("names no recording", path=path, field=f"metadata {RECORD}: {RECORDING}")
+                raise LogError("names no recording", path=path, field=f"metadata {PREDICTIONS_RECORD}: {RECORDING}")
         except BaseException:
             self.close()
             raise

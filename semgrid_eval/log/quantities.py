@@ -1,5 +1,6 @@
 """What the messages of a log measure, by topic and name: of motion, calibration and pictures."""
 
+import math
 import re
 from collections.abc import Generator, Iterable, Iterator
 from itertools import pairwise
@@ -107,6 +108,19 @@ def lidar_extents(log: LogReader, lidar: str) -> Extents:
             if values is not None and len(values):
                 _widen(found, name, Extent(float(values.min()), float(values.max())))
     return {lidar_topic(lidar): found}
+
+
+def truth_faults(log: LogReader) -> Iterator[Finding]:
+    """Look at every true pose and box; the first of each that is impossible is an error."""
+    for pose in log.poses():
+        if not all(map(math.isfinite, (pose.x_m, pose.y_m, pose.yaw_rad))):
+            yield error(topics.TRUE_POSE, f"is not finite at {pose.stamp_ns} ns")
+            break
+    boxes = ((stamp_ns, actor) for stamp_ns, actors in log.actors() for actor in actors)
+    for stamp_ns, actor in boxes:
+        if fault := actor.fault():
+            yield error(topics.TRUE_ACTORS, f"at {stamp_ns} ns: actor {actor.actor_id} {fault}")
+            break
 
 
 def _frame_values(frame: CameraFrame) -> Iterator[tuple[str, str, Extent]]:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.faults import not_one_of
 from semgrid_eval.log import codec, recovered, topics
-from semgrid_eval.log.codec import CONDITIONS_RECORD, RECORD, Scene
+from semgrid_eval.log.codec import CONDITIONS_RECORD, PLAYBACK_RECORD, PREDICTIONS_RECORD, RECORD, Scene
 from semgrid_eval.log.container import Container, damage_as_log_error
 from semgrid_eval.log.recovered import Recovered
 from semgrid_eval.log.sweeps import read_sweep
@@ -26,6 +26,22 @@ _DECODERS: dict[str, Callable[[bytes], Any]] = {
     **dict.fromkeys((topics.EGO_POSE, topics.TRUE_POSE), codec.read_pose),
     topics.TRUE_ACTORS: codec.read_actors,
 }
+_TYPES = {
+    topics.EGO_MOTION: "semgrid.v1.Egomotion",
+    **dict.fromkeys((topics.EGO_POSE, topics.TRUE_POSE), "foxglove.PoseInFrame"),
+    topics.TRUE_ACTORS: "semgrid.v1.Actors",
+}
+_CAMERA_TYPES = {
+    **dict.fromkeys(topics.PICTURE_FIELDS, "foxglove.CompressedImage"),
+    topics.CALIBRATION: "foxglove.CameraCalibration",
+    topics.STEREO: "semgrid.v1.StereoCalibration",
+}
+_LIDAR_TYPE = "foxglove.PointCloud"
+_OTHERS = {
+    PLAYBACK_RECORD: "is a run to be watched, as `semgrid-eval play` writes it, not a recording",
+    PREDICTIONS_RECORD: "holds predictions, not a recording",
+}
+"""What logs of this package are that are not recordings, by their metadata record."""
 
 
 class Picture(NamedTuple):
@@ -57,7 +73,9 @@ class LogReader(Container):
         try:
             entries = self.metadata(RECORD)
             if entries is None:
-                raise LogError(f"has no metadata record {RECORD}; it was not written by semgrid-eval", path=path)
+                foreign = f"has no metadata record {RECORD}; it was not written by semgrid-eval"
+                told = (words for name, words in _OTHERS.items() if self.metadata(name) is not None)
+                raise LogError(next(told, foreign), path=path)
             with damage_as_log_error(path):
                 self.scene = Scene.from_metadata(entries)
         except BaseException:
@@ -106,6 +124,19 @@ class LogReader(Container):
         """Return the name of the message type by topic."""
         names = {number: schema.name for number, schema in self.summary.schemas.items()}
         return {each.topic: names.get(each.schema_id, "") for each in self.summary.channels.values()}
+
+    def wrong_types(self) -> dict[str, str]:
+        """Return what is wrong with the messages of topics that hold others than are read from them, by topic."""
+        camera_types = {
+            camera_topic(camera, channel): kind
+            for camera, (channel, kind) in product(self.scene.cameras, _CAMERA_TYPES.items())
+        }
+        needed = {**_TYPES, **camera_types, **dict.fromkeys(map(lidar_topic, self.lidars), _LIDAR_TYPE)}
+        return {
+            topic: f"holds {found or 'untyped'} messages; {needed[topic]} is needed"
+            for topic, found in self.schemas().items()
+            if found != needed.get(topic, found)
+        }
 
     def require_count(self, count: int) -> None:
         """Make sure that as many messages were found as the index states.
@@ -189,6 +220,7 @@ class LogReader(Container):
 
     def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
         """Iterate over what messages say; `decoders` maps topics to what reads their messages."""
+        self._require_types(decoders)
         for topic, stamp_ns, data, _ in self.messages(decoders):
             with self._faults_at(f"{topic} at {stamp_ns} ns"):
                 value = decoders[topic](data)
@@ -215,7 +247,14 @@ class LogReader(Container):
         fault = f"there are several, name one: {', '.join(there)}" if chosen is None else not_one_of(chosen, there)
         raise LogError(fault if there else "the log has none", path=self.path, field=what)
 
+    def _require_types(self, wanted: Iterable[str]) -> None:
+        wrong = self.wrong_types()
+        for topic in wanted:
+            if topic in wrong:
+                raise LogError(wrong[topic], path=self.path, field=topic)
+
     def _first(self, topic: str) -> bytes:
+        self._require_types([topic])
         entry = next(self.messages([topic]), None)
         if entry is None:
             raise LogError("has no message", path=self.path, field=topic)

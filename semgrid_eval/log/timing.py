@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from semgrid_eval.log.contract import Clock, Contract, Latency, Range, TopicContract, topics_of
 from semgrid_eval.log.findings import Finding
+from semgrid_eval.log.topics import LABEL, camera_topic
 
 _NS_PER_S = 1e9
 
@@ -38,7 +39,8 @@ def timing(topic: str, expected: TopicContract, timeline: Timeline, camera: str)
         (other,) = topics_of(expected.missing_beside.topic, (camera,)).values()
         wanted = set(_logged(timeline, other))
         count = len(wanted - set(times_ns))
-        text = f"is missing for {count} of {len(wanted)} messages of {other}"
+        missing = "missing (`semgrid-eval segment` adds it)" if topic == camera_topic(camera, LABEL) else "missing"
+        text = f"is {missing} for {count} of {len(wanted)} messages of {other}"
         yield from judged(expected.missing_beside, f"{topic}: missing_beside", count, text)
     yield from _steps(topic, expected, times_ns)
 

@@ -5,14 +5,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.log.codec import PLAYBACK_RECORD
 from semgrid_eval.log.container import Container
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import SUFFIX
 
-RECORD = "semgrid.playback"
-"""The metadata record of a play log."""
 LAYOUT = "layout"
-"""Its entry that holds the digest of the layout which was written beside it."""
+"""The entry of a play log's metadata record that holds the digest of the layout which was written beside it."""
 _ADVICE = "name another file, or replace it with --force"
 
 
@@ -48,7 +47,7 @@ def digest_of(content: bytes) -> str:
 def _metadata(out: Path) -> dict[str, str] | None:
     try:
         with Container(out) as log:
-            return log.metadata(RECORD)
+            return log.metadata(PLAYBACK_RECORD)
     except LogError:
         return None
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file, write_text
-from semgrid_eval.log.predictions import RECORD as PREDICTIONS_RECORD
+from semgrid_eval.log.codec import PLAYBACK_RECORD, PREDICTIONS_RECORD
 from semgrid_eval.log.predictions import RECORDING
 from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.playback.again import Again
 from semgrid_eval.playback.backdrop import Backdrop
 from semgrid_eval.playback.layout import viewer_layout
 from semgrid_eval.playback.live import PlayedStreams
-from semgrid_eval.playback.place import LAYOUT, RECORD, digest_of, require_place
+from semgrid_eval.playback.place import LAYOUT, digest_of, require_place
 from semgrid_eval.playback.played import PlayedWindows
 from semgrid_eval.playback.refit import Sources
 from semgrid_eval.playback.scored import (
@@ -113,7 +113,7 @@ def write_playback(play: Play, out: Path, *, force: bool = False, progress: Prog
         if len(chosen) == 1:  # times of others are shifted
             writer.metadata(PREDICTIONS_RECORD, {RECORDING: chosen[0]})
         told = {LAYOUT: digest_of(text.encode()), "shift_ns": json.dumps(shifts_ns)}
-        writer.metadata(RECORD, player.metadata() | told)
+        writer.metadata(PLAYBACK_RECORD, player.metadata() | told)
         write_text(layout, text)
     return Playback(out, layout, tuple(chosen), tuple(player.notes))
 

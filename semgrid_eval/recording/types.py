@@ -73,6 +73,16 @@ class Actor:
     velocity_x_mps: float
     velocity_y_mps: float
 
+    def fault(self) -> str:
+        """Say what is impossible in the box; empty where nothing is."""
+        if not all(map(math.isfinite, (self.x_m, self.y_m, self.yaw_rad))):
+            return "is not at a finite place"
+        if not (0.0 < self.length_m <= LONGEST_ACTOR_M and 0.0 < self.width_m <= LONGEST_ACTOR_M):
+            return f"is {self.length_m:g} x {self.width_m:g} m; 0 to {LONGEST_ACTOR_M:g} m are allowed"
+        if not all(map(math.isfinite, (self.height_m, self.velocity_x_mps, self.velocity_y_mps))):
+            return "has a height or velocity that is not finite"
+        return "" if self.label_id < 256 else f"has label {self.label_id}"
+
 
 @dataclass(frozen=True)
 class CameraFrame:

@@ -12,7 +12,11 @@ Side = Annotated[int, Field(ge=1)]
 Resampling = Literal["bilinear", "nearest"]
 _SIZE = "Width and height for the network.  [default: the image's]"
 _OUTPUT = "Which output of the model to read, where there are several."
-_LABEL_IDS = "Classes are Cityscapes label ids (0..33) instead of the 19 train ids."
+_CLASSES = (
+    "What its classes are: cityscapes (19 train ids), cityscapes-ids (34 label ids), mapillary (65 or 66), "
+    "ade20k (150), or a YAML file of your own."
+)
+_LAYOUT = "Order of the axes of image and scores; auto: channels come last where only the last axis is said to be 3."
 
 
 class SegmentationConfig(Config):
@@ -20,8 +24,8 @@ class SegmentationConfig(Config):
 
     mean: Annotated[Channels, Field(description="Of RGB in 0..1.")] = (0.485, 0.456, 0.406)
     std: Annotated[tuple[Spread, Spread, Spread], Field(description="Of RGB in 0..1.")] = (0.229, 0.224, 0.225)
-    layout: Annotated[Literal["nchw", "nhwc"], Field(description="Order of the axes of image and scores.")] = "nchw"
+    layout: Annotated[Literal["auto", "nchw", "nhwc"], Field(description=_LAYOUT)] = "auto"
     size: Annotated[tuple[Side, Side] | None, Field(description=_SIZE)] = None
     output: Annotated[str | None, Field(description=_OUTPUT)] = None
-    label_ids: Annotated[bool, Field(description=_LABEL_IDS)] = False
+    classes: Annotated[str, Field(description=_CLASSES)] = "cityscapes"
     upsample: Annotated[Resampling, Field(description="How scores get the image's size.")] = "bilinear"

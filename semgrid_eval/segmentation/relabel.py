@@ -18,6 +18,7 @@ from semgrid_eval.log.store import find_logs, read_recording
 from semgrid_eval.recording.colour import decode_colour
 from semgrid_eval.recording.png import encode_gray
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
+from semgrid_eval.segmentation.class_maps import ClassMap
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.network import SegmentationNetwork
 
@@ -28,25 +29,36 @@ Labeller = Callable[[NDArray[np.uint8]], NDArray[np.uint8]]
 
 
 def segment_logs(
-    logs: Sequence[Path], model: Path, config: SegmentationConfig, out: Path, work: Work = IN_PROCESS
+    logs: Sequence[Path],
+    model: Path,
+    config: SegmentationConfig,
+    out: Path,
+    work: Work = IN_PROCESS,
+    *,
+    device: str = "auto",
 ) -> ConversionSummary:
     """Write the log OUT/<split>/<name>.mcap for each log: all it holds, its label images made by a network.
 
-    A log that is whole and was made from the same log, model and config is left as it is. One that fails is named in
-    the summary with its reason. `logs` are files, and folders of which all logs are taken; `model` is the ONNX file,
-    and files beside it whose names begin with its name (its weights) count as part of it.
+    A log that is whole and was made from the same log, model and config on the same kind of device is left as it is.
+    One that fails is named in the summary with its reason. `logs` are files, and folders of which all logs are taken;
+    `model` is the ONNX file, and files beside it whose names begin with its name (its weights) count as part of it;
+    `device` is as `open_model` says, and the summary's remark tells which it was.
 
     Raises:
         MissingExtraError: ONNX Runtime is not installed.
+        ConfigError: there is no such device or class map.
         InputError: the model cannot be used, a folder holds no log, two logs have one name, or `out` would mix the new
             logs with the old.
     """
     _refuse_mixing(logs, out)
     paths = [path for given in logs for path in (find_logs(given) if given.is_dir() else [given])]
-    SegmentationNetwork(model, config)  # a model that cannot be used is one error, not one for each log
+    network = SegmentationNetwork(model, config, device=device)  # one that cannot be used is one error, not one a log
     parts = sorted(path for path in model.parent.glob(f"{escape(model.name)}*") if path.is_file())
-    recipe = _Recipe(model, digest_files(parts), config)
-    return convert_jobs([_job(path, recipe) for path in paths], out, work, label="segment")
+    recipe = _Recipe(model, digest_files(parts), config, network.class_map, network.device)
+    summary = convert_jobs([_job(path, recipe) for path in paths], out, work, label="segment")
+    if summary.written or summary.skipped:
+        summary.remark = f"labels: {model.name} on {network.device}, its classes by the map {network.class_map.name}"
+    return summary
 
 
 def _relabelled(recording: Recording, label: Labeller) -> Iterator[Moment]:
@@ -76,6 +88,8 @@ class _Recipe:
     model: Path
     model_digest: str
     config: SegmentationConfig
+    class_map: ClassMap
+    device: str
 
     def record(self, path: Path) -> dict[str, object]:
         """Return what makes the labels of a log."""
@@ -85,7 +99,10 @@ class _Recipe:
             "model": self.model.name,
             "model_digest": self.model_digest,
             "log_digest": log_digest,
-            "config": self.config.model_dump(mode="json"),
+            "config": self.config.model_dump(mode="json", exclude={"classes"}),
+            "classes": self.class_map.name,
+            "labels": self.class_map.labels,  # of classes in their order
+            "device": self.device.partition(":")[0],  # which of several GPUs does not matter
             "method_version": _METHOD_VERSION,
         }
 
@@ -97,10 +114,13 @@ class _Recipe:
         """Return the new recording of a log."""
         record = self.record(path)
         recording = read_recording(path)
-        moments = partial(_relabelled, recording, _network(self.model, self.model_digest, self.config).label)
+        moments = partial(_relabelled, recording, self._network().label)
         note = json.dumps(record, indent=2, sort_keys=True).encode()
         files = {**recording.source_files, RECORD: note}
         return replace(recording, moments=moments, source_digest=digest_value(record), source_files=files)
+
+    def _network(self) -> SegmentationNetwork:
+        return _opened(self.model, self.model_digest, self.config, self.device)
 
 
 def _job(path: Path, recipe: _Recipe) -> ConversionJob:
@@ -113,9 +133,9 @@ def _job(path: Path, recipe: _Recipe) -> ConversionJob:
 
 
 @lru_cache(maxsize=1)
-def _network(model: Path, model_digest: str, config: SegmentationConfig) -> SegmentationNetwork:
+def _opened(model: Path, model_digest: str, config: SegmentationConfig, device: str) -> SegmentationNetwork:
     """Open a model once for all logs of a process."""
-    return SegmentationNetwork(model, config)
+    return SegmentationNetwork(model, config, device=device)
 
 
 def _refuse_mixing(logs: Sequence[Path], out: Path) -> None:

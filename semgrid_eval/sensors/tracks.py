@@ -22,7 +22,7 @@ from semgrid_eval.errors import LogError
 from semgrid_eval.geometry import SE2
 from semgrid_eval.log.topics import TRUE_ACTORS
 from semgrid_eval.recording.road_map import RoadMap
-from semgrid_eval.recording.types import LONGEST_ACTOR_M, Actor
+from semgrid_eval.recording.types import Actor
 from semgrid_eval.sensors.sensor import Morphology, Points, SensorConfig
 
 if TYPE_CHECKING:
@@ -62,19 +62,10 @@ def _read(log: "LogReader", poses: Mapping[int, SE2], sampler: "_Sampler") -> It
         if stamp_ns not in poses:
             raise LogError(f"has no true pose at {stamp_ns} ns", path=log.path)
         for actor in actors:
-            if fault := _fault(actor):
+            if fault := actor.fault():
                 place = f"{TRUE_ACTORS} at {stamp_ns} ns: actor {actor.actor_id}"
                 raise LogError(fault, path=log.path, field=place)
         yield sampler.points(stamp_ns, actors, poses[stamp_ns])
-
-
-def _fault(actor: Actor) -> str:
-    """Say what is impossible in a box; empty where nothing is."""
-    if not all(math.isfinite(each) for each in (actor.x_m, actor.y_m, actor.yaw_rad)):
-        return "is not at a finite place"
-    if not (0.0 < actor.length_m <= LONGEST_ACTOR_M and 0.0 < actor.width_m <= LONGEST_ACTOR_M):
-        return f"is {actor.length_m:g} x {actor.width_m:g} m; 0 to {LONGEST_ACTOR_M:g} m are allowed"
-    return "" if actor.label_id < 256 else f"has label {actor.label_id}"
 
 
 @dataclass(frozen=True)

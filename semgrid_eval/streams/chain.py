@@ -44,7 +44,7 @@ class Parts:
     segment: Path | None = None  # ONNX file of a segmentation network
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)  # how it is used
     right: Path | None = None  # folder of right images, as `RightImages` says
-    device: str = "auto"  # of grids and models
+    device: str = "auto"  # of networks and grids
     threads: int | None = None  # of torch, OpenCV and ONNX Runtime; None leaves them what they are
     processor_time: bool = False  # whether that is counted, which other work on the machine does not change
 
@@ -79,7 +79,9 @@ def build_chain(logs: Sequence[Path], parts: Parts) -> Built:
     made = models_for(parts.models, logs[0], device)
     segmentation = None
     if parts.segment is not None:
-        segmentation = SegmentationNetwork(parts.segment, parts.segmentation, threads=parts.threads)
+        segmentation = SegmentationNetwork(
+            parts.segment, parts.segmentation, device=parts.device, threads=parts.threads
+        )
     chain = Chain({each.name: each.model for each in made}, device, segmentation, parts.right)
     return Built(chain, tuple(each.name for each in made if each.is_random))
 

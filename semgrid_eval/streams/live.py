@@ -116,7 +116,7 @@ class LiveLog:
     def _decoded(self, frame: CameraFrame, right_png: bytes | None) -> _Pictures:
         label = disparity = left = None
         if self._chain.segmentation is None:
-            png = self._needed(frame.label_png, "label image", frame)
+            png = self._needed(frame.label_png, "label image; `semgrid-eval segment` adds them", frame)
             label = decode_gray(png, bit_depth=8, path=self._log.path).astype(np.uint8, copy=False)
         if self._right is None:
             disparity = decode_gray(frame.disparity_png, bit_depth=16, path=self._log.path).astype(

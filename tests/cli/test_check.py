@@ -44,7 +44,8 @@ def test_example_of_the_help_runs(logs, monkeypatch, capsys):
     assert run(*arguments) == 0
     said = capsys.readouterr()
     place = "logs/val/a.mcap: warning: /camera/front/label: missing_beside"
-    assert f"{place}: is missing for 3 of 6 messages of /camera/front/disparity (allowed: at most 0)\n" in said.out
+    missing = "is missing (`semgrid-eval segment` adds it) for 3 of 6 messages of /camera/front/disparity"
+    assert f"{place}: {missing} (allowed: at most 0)\n" in said.out
     assert said.err.endswith("1 logs checked, 0 with errors\n")
 
 

@@ -46,7 +46,17 @@ def test_second_run_writes_nothing(tree, tmp_path, capsys):
     arguments = ("convert", "cityscapes", tree.root, tmp_path / "logs", "--workers", 1)
     assert run(*arguments) == 0
     assert run(*arguments) == 0
-    assert capsys.readouterr().err.endswith("logs: 0 written, 1 up to date, 0 failed\n")
+    assert "logs: 0 written, 1 up to date, 0 failed\n" in capsys.readouterr().err
+
+
+def test_frames_without_labels_are_counted_and_how_to_label_them_is_told(tree, tmp_path, capsys):
+    tree.gt_fine = True
+    tree.write(range(30))
+    broken = Tree(tree.root, city="bonn")
+    broken.disparity(broken.write(range(2))[1]).unlink()  # what fails does not count
+    assert run("convert", "cityscapes", tree.root, tmp_path / "logs") == 1
+    command = f"semgrid-eval segment {tmp_path / 'logs'} --model NETWORK.onnx --out LABELLED"
+    assert capsys.readouterr().err.endswith(f"29 of 30 frames have no labels: add them with {command}\n")
 
 
 def test_faulty_sequences_are_named_and_the_rest_is_converted(tree, tmp_path, capsys):
@@ -81,7 +91,7 @@ def test_logs_of_an_earlier_conversion_are_a_warning_in_the_splits_converted_now
         assert "Warning" not in capsys.readouterr().err
     assert run("convert", "cityscapes", other.root, logs, "--split", "val") == 0
     stray = logs / "val" / "aachen_000000_000000.mcap"
-    last = capsys.readouterr().err.splitlines()[-1]
+    *_, last, _ = capsys.readouterr().err.splitlines()
     assert last == f"Warning: {logs} holds 1 logs that do not belong to this conversion, such as {stray}"
 
 

@@ -40,7 +40,9 @@ def test_example_of_the_help_runs(place, capsys):
     program, *arguments = shlex.split(command.epilog.removeprefix("Example: "))
     assert program == "semgrid-eval"
     assert run(*arguments) == 0
-    assert capsys.readouterr().err.endswith("labelled: 1 written, 0 up to date, 0 failed\n")
+    said = capsys.readouterr().err
+    assert "labelled: 1 written, 0 up to date, 0 failed\n" in said
+    assert said.endswith("labels: network.onnx on cpu, its classes by the map cityscapes\n")
     assert check_log(place / "labelled/val/street.mcap").good
 
 
@@ -64,8 +66,14 @@ def test_failed_log_gives_exit_code_1(place, capsys):
     [
         (("--std", 1, 0, 1), "Error: std.1: must be above 0, not 0.0\n"),
         (("--size", 0, 8), "Error: size.0: must be at least 1, not 0\n"),
+        (("--classes", "citscapes"), "Error: classes: 'citscapes' is neither a file nor one of cityscapes, "),
+        (("--device", "gpu"), "Error: device: there is no device 'gpu' for ONNX Runtime; use auto, cpu or cuda\n"),
+        (("--device", "cuda"), "Error: device: this ONNX Runtime cannot use 'cuda'; install onnxruntime-gpu "),
         (("--output", "aux"), "Error: network.onnx: output: there is no aux; there are: answer\n"),
-        (("--label-ids", "--out", "logs"), "Error: logs: out: contains or is inside logs; new logs need a folder"),
+        (
+            ("--classes", "cityscapes-ids", "--out", "logs"),
+            "Error: logs: out: contains or is inside logs; new logs need a folder",
+        ),
     ],
 )
 def test_mistakes_are_one_line(place, capsys, option, message):

@@ -9,21 +9,20 @@ import pytest
 import yaml
 from support.bags import RecordingBag, Sent, Variant, write_bag
 from support.commands import run_command
-from support.onnx_models import colour_network
+from support.onnx_models import toy_labeller
 from support.pages import blocks, commands, text_of
 from support.rig_bags import lidar_link
 from support.ros_messages import cloud
 from support.swept import seen
 from support.toy_world import START_NS, street
 
-from semgrid_eval.classes import CITYSCAPES_LABELS, UNKNOWN
+from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.config import parse_config
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.scores.results import read_run
-from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.sources.ros2.mapping import load_map
 
 PAGE = text_of("docs/own-car.md")
@@ -31,22 +30,11 @@ YAML = blocks("yaml", PAGE)
 COMMANDS = [line for line in commands(PAGE) if line.startswith("semgrid-eval ")]
 
 
-def labelling_network(path):
-    """Write a network that knows the colours by which the toy world paints its labels."""
-    levels = {label.train_id: label.label_id * 7 / 255 for label in CITYSCAPES_LABELS if label.train_id < 19}
-    config = SegmentationConfig()
-    painted = {
-        number: tuple((level - mean) / std for mean, std in zip(config.mean, config.std, strict=True))
-        for number, level in levels.items()
-    }
-    return colour_network(path, colours=painted)
-
-
 @pytest.fixture
 def workplace(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_bag(tmp_path / "drive", with_lidar(street(1, frames=16, noise_px=0.05)))
-    labelling_network(tmp_path / "network.onnx")
+    toy_labeller(tmp_path / "network.onnx")
     (tmp_path / "m.yaml").write_text(YAML[2])
     (tmp_path / "both.yaml").write_text(YAML[3])
     return tmp_path

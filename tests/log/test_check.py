@@ -1,15 +1,20 @@
+import math
 import random
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.driving import CALIBRATION, FRAME_NS, driving
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from support.bad.logs import as_it_is, copy
+from support.driving import CALIBRATION, FRAME_NS, START_NS, driving
 
 from semgrid_eval.log.check import check_log
-from semgrid_eval.log.codec import image_message
+from semgrid_eval.log.codec import PLAYBACK_RECORD, PREDICTIONS_RECORD, image_message
 from semgrid_eval.log.contract import Contract, Range, TopicContract
 from semgrid_eval.log.findings import Severity
 from semgrid_eval.log.store import write_log
+from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.recording.png import encode_gray
 
 # Every frame of this recording has all pictures, and nothing about it is odd.
@@ -76,9 +81,9 @@ def test_missing_labels_and_images_are_counted(tmp_path):
     assert findings(tmp_path, change) == {
         f"/camera/front/{channel}: missing_beside": (
             Severity.WARNING,
-            f"is missing for {count} of 8 messages of /camera/front/disparity (allowed: at most 0)",
+            f"is missing{hint} for {count} of 8 messages of /camera/front/disparity (allowed: at most 0)",
         )
-        for channel, count in (("label", 3), ("image", 5))
+        for channel, hint, count in (("label", " (`semgrid-eval segment` adds it)", 3), ("image", "", 5))
     }
 
 
@@ -143,6 +148,65 @@ def test_motion_that_is_no_number_is_an_error(tmp_path, speed_mps):
     samples = smooth(lambda number, moment: with_motion(moment, speed_mps=speed_mps) if number == 3 else moment)
     write_log(replace(driving(), moments=lambda: samples), path)
     assert not check_log(path).good
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"x_m": math.nan}, "actor 301 is not at a finite place"),
+        ({"length_m": 0.0}, "actor 301 is 0 x 1.75 m; 0 to 200 m are allowed"),
+        ({"velocity_y_mps": math.inf}, "actor 301 has a height or velocity that is not finite"),
+    ],
+)
+def test_impossible_actors_are_one_error(tmp_path, change, fault):
+    def spoiled(number, moment):
+        if number != 5:
+            return moment
+        first, second = moment.actors
+        return replace(moment, actors=(first, replace(second, **change)))
+
+    stamp_ns = START_NS + 5 * FRAME_NS
+    assert findings(tmp_path, spoiled) == {"/truth/actors": (Severity.ERROR, f"at {stamp_ns} ns: {fault}")}
+
+
+def test_true_pose_that_is_not_finite_is_an_error(tmp_path):
+    def spoiled(number, moment):
+        return replace(moment, pose=replace(moment.pose, yaw_rad=math.nan)) if number == 2 else moment
+
+    told = f"is not finite at {START_NS + 2 * FRAME_NS} ns"
+    assert findings(tmp_path, spoiled) == {"/truth/pose": (Severity.ERROR, told)}
+
+
+@pytest.mark.parametrize("topic", ["/ego/motion", "/truth/actors", "/camera/front/label", "/camera/front/stereo"])
+def test_messages_of_another_type_are_an_error_and_the_rest_is_checked(tmp_path, topic):
+    path = tmp_path / "log.mcap"
+    write_log(replace(driving(), moments=smooth), path)
+    with path.open("rb") as old, (tmp_path / "new.mcap").open("wb") as stream:
+        writer = Writer(stream, enable_data_crcs=True)
+        writer.start(profile="", library="")
+        copy(make_reader(old), writer, as_it_is, None, {"types": {topic: "foxglove.Grid"}})
+        writer.finish()
+    report = check_log(tmp_path / "new.mcap")
+    assert report.is_readable
+    told = [str(finding) for finding in report.findings]
+    assert told[0].startswith(f"error: {topic}: type: holds foxglove.Grid messages; ")
+    camera = "error: camera front: cannot be looked at without proper messages of"
+    assert told[1:] == ([f"{camera} {topic}"] if topic.startswith("/camera") else [])
+
+
+@pytest.mark.parametrize(
+    ("record", "told"),
+    [
+        (PLAYBACK_RECORD, "is a run to be watched, as `semgrid-eval play` writes it, not a recording"),
+        (PREDICTIONS_RECORD, "holds predictions, not a recording"),
+        ("another", "has no metadata record semgrid.scene; it was not written by semgrid-eval"),
+    ],
+)
+def test_logs_that_are_not_recordings_are_named_as_what_they_are(tmp_path, record, told):
+    with (tmp_path / "log.mcap").open("wb") as stream, MessageWriter(stream) as writer:
+        writer.metadata(record, {"a": "b"})
+    (finding,) = check_log(tmp_path / "log.mcap").findings
+    assert finding.message == told
 
 
 @pytest.mark.parametrize(

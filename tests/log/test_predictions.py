@@ -7,9 +7,9 @@ from mcap.writer import Writer
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.log.codec import PREDICTIONS_RECORD
 from semgrid_eval.log.grids import CLASSES, GridPlace, exact_message
 from semgrid_eval.log.predictions import (
-    RECORD,
     TOPIC,
     GridExtent,
     Prediction,
@@ -35,7 +35,7 @@ def write(path, messages, topic=TOPIC, record=None):
     """Write messages as (publish, message, log time)."""
     with path.open("wb") as stream, MessageWriter(stream) as writer:
         if record is not None:
-            writer.metadata(RECORD, record)
+            writer.metadata(PREDICTIONS_RECORD, record)
         for publish_ns, message, *log_ns in messages:
             writer.write(topic, message, log_ns=log_ns[0] if log_ns else publish_ns, publish_ns=publish_ns)
     return path

@@ -4,7 +4,7 @@ import pytest
 pytest.importorskip("onnxruntime", reason="the extra 'segment' is not installed")
 pytest.importorskip("onnx", reason="onnx, which makes the models, is not installed")
 
-from onnx import TensorProto, helper
+from onnx import TensorProto, helper, numpy_helper
 from support.onnx_models import FLAT, colour_network, save
 
 from semgrid_eval.classes import LABEL_ID
@@ -24,6 +24,13 @@ def open_network(path, **options):
 def painted(rows):
     """A picture of letters: r red, b blue."""
     return np.array([[RED if letter == "r" else BLUE for letter in row] for row in rows], np.uint8)
+
+
+@pytest.fixture
+def three(tmp_path):
+    """A class map of three classes, which have their indices as label ids."""
+    (tmp_path / "three.yaml").write_text("classes: {none: unlabeled, own: ego vehicle, edge: rectification border}")
+    return str(tmp_path / "three.yaml")
 
 
 def named(rows):
@@ -63,7 +70,7 @@ def test_pictures_of_several_sizes_go_through_open_axes(path):
 
 def test_label_ids_stay_label_ids(path):
     colours = {ROAD: (1.0, 0.0, 0.0), CAR: (0.0, 0.0, 1.0)}
-    network = open_network(colour_network(path, classes=34, colours=colours), label_ids=True)
+    network = open_network(colour_network(path, classes=34, colours=colours), classes="cityscapes-ids")
     assert network.label(painted(ASYMMETRIC)).tolist() == named(ASYMMETRIC)
 
 
@@ -81,6 +88,25 @@ def test_void_ids_are_unlabeled(path):
 def test_channels_may_come_last(path):
     model = colour_network(path, colours=TRAIN, shape=(1, "h", "w", 3), nhwc=True)
     assert open_network(model, layout="nhwc").label(painted(ASYMMETRIC)).tolist() == named(ASYMMETRIC)
+
+
+@pytest.mark.parametrize("layout", ["nhwc", "auto"])
+def test_layout_of_the_axes_is_found(path, layout):
+    rows = ["rrrrb", "rbbbb", "rrrrr"]  # neither side is 3
+    model = colour_network(path, colours=TRAIN, shape=(1, "h", "w", 3), nhwc=True)
+    assert open_network(model, layout=layout).label(painted(rows)).tolist() == named(rows)
+
+
+def test_ids_may_have_an_axis_of_one_class(path):
+    nodes = [
+        helper.make_node("ReduceMax", ["image", "axes"], ["high"], keepdims=1),
+        helper.make_node("Cast", ["high"], ["answer"], to=TensorProto.INT64),
+    ]
+    axes = numpy_helper.from_array(np.array([1], np.int64), "axes")
+    outputs = [tensor("answer", [1, "one", "h", "w"], TensorProto.INT64)]
+    model = save(path, nodes, [tensor("image", [1, 3, "h", "w"])], outputs, [axes], opset=18)
+    picture = np.array([[[0, 0, 0], [0, 255, 0]]], np.uint8)
+    assert open_network(model).label(picture).tolist() == [[ROAD, LABEL_ID["sidewalk"]]]
 
 
 @pytest.mark.parametrize("upsample", ["bilinear", "nearest"])
@@ -109,15 +135,15 @@ def test_normalisation_reaches_the_network(path):
     assert network.label(painted(["rb"])).tolist() == named(["rb"])
 
 
-def test_one_of_several_outputs_is_chosen_by_name(path):
+def test_one_of_several_outputs_is_chosen_by_name(path, three):
     rank_4 = ["n", 3, "h", "w"]
     nodes = [helper.make_node("Identity", ["image"], [name]) for name in ("out", "aux")]
     model = save(path, nodes, [tensor("image", [1, 3, "h", "w"])], [tensor("out", rank_4), tensor("aux", rank_4)])
     with pytest.raises(InputError, match=r"network\.onnx: output: none is chosen; there are: out, aux"):
-        open_network(model, label_ids=True)
+        open_network(model, classes=three)
     with pytest.raises(InputError, match=r"network\.onnx: output: there is no main; there are: out, aux"):
-        open_network(model, label_ids=True, output="main")
-    found = open_network(model, label_ids=True, output="aux").label(painted(["rb"]))
+        open_network(model, classes=three, output="main")
+    found = open_network(model, classes=three, output="aux").label(painted(["rb"]))
     assert found.tolist() == [[0, 2]]  # the brightest channel
 
 
@@ -163,7 +189,7 @@ def test_input_that_is_no_image_is_refused(path, shape, kind):
 def test_wrong_layout_is_refused(path):
     model = colour_network(path, colours=TRAIN, shape=(1, 8, 8, 3), nhwc=True)
     with pytest.raises(InputError, match=r"image: is tensor\(float\) of shape \(1, 8, 8, 3\); float \(1, 3, H, W\)"):
-        open_network(model)
+        open_network(model, layout="nchw")
 
 
 def test_size_other_than_the_fixed_one_is_refused(path):
@@ -173,18 +199,37 @@ def test_size_other_than_the_fixed_one_is_refused(path):
     open_network(model, size=(4, 8))
 
 
-@pytest.mark.parametrize(("classes", "label_ids"), [(3, False), (20, False), (35, True), (1, True)])
-def test_number_of_classes_must_fit(path, classes, label_ids):
-    node = helper.make_node("Concat", ["image"] * 12, ["many"], axis=1)
-    cut = helper.make_node("Slice", ["many", "begin", "end", "axis"], ["answer"])
-    constants = [
-        helper.make_tensor(n, TensorProto.INT64, [1], [v]) for n, v in (("begin", 0), ("end", classes), ("axis", 1))
-    ]
-    inputs, outputs = [tensor("image", [1, 3, "h", "w"])], [tensor("answer", [1, classes, "h", "w"])]
-    model = save(path, [node, cut], inputs, outputs, constants)
-    wanted = "at most 34 label ids" if label_ids else "19 train ids"
-    with pytest.raises(InputError, match=rf"network\.onnx: answer: scores {classes} classes; {wanted} are needed"):
-        open_network(model, label_ids=label_ids)
+@pytest.mark.parametrize(
+    ("count", "classes", "told"),
+    [
+        (3, "cityscapes", "scores 3 classes; cityscapes has 19"),
+        (20, "cityscapes", "scores 20 classes; cityscapes has 19"),
+        (150, "cityscapes", "scores 150 classes; cityscapes has 19; --classes ade20k has so many"),
+        (34, "cityscapes", "scores 34 classes; cityscapes has 19; --classes cityscapes-ids has so many"),
+        (33, "cityscapes-ids", "scores 33 classes; cityscapes-ids has 34"),
+        (64, "mapillary", "scores 64 classes; mapillary has 66"),
+        (149, "ade20k", "scores 149 classes; ade20k has 150"),
+    ],
+)
+def test_number_of_classes_must_fit(path, count, classes, told):
+    model = scores_of(path, count)
+    with pytest.raises(InputError) as caught:
+        open_network(model, classes=classes)
+    assert str(caught.value) == f"{path}: answer: {told}"
+
+
+@pytest.mark.parametrize(
+    ("count", "classes"), [(19, "cityscapes"), (34, "cityscapes-ids"), (65, "mapillary"), (66, "mapillary")]
+)
+def test_numbers_of_classes_that_fit(path, count, classes):
+    assert open_network(scores_of(path, count), classes=classes).class_map.name == classes
+
+
+def scores_of(path, count):
+    """A model that scores so many classes."""
+    weight = numpy_helper.from_array(np.zeros((count, 3, 1, 1), np.float32), "weight")
+    node = helper.make_node("Conv", ["image", "weight"], ["answer"])
+    return save(path, [node], [tensor("image", [1, 3, "h", "w"])], [tensor("answer", [1, count, "h", "w"])], [weight])
 
 
 def test_answer_of_other_rank_or_type_is_refused(path):
@@ -203,30 +248,32 @@ def test_open_number_of_classes_is_checked_when_it_is_known(path):
     node = helper.make_node("Reshape", ["image", "shape"], ["answer"])
     outputs = [tensor("answer", [1, "classes", 1, 1])]
     network = open_network(save(path, [node], [tensor("image", [1, 3, "h", "w"])], outputs, [shape]))
-    with pytest.raises(InputError, match=r"network\.onnx: answer: scores 6 classes; 19 train ids are needed"):
+    with pytest.raises(InputError, match=r"network\.onnx: answer: scores 6 classes; cityscapes has 19"):
         network.label(painted(["rb"]))
 
 
 def test_ids_outside_of_the_set_are_refused(path):
     network = open_network(colour_network(path, classes=34, colours={7: (1, 0, 0), 26: (0, 0, 1)}, ids=np.int64))
-    with pytest.raises(InputError, match=r"network\.onnx: answer: gives the id 26, which is not a train id"):
+    with pytest.raises(
+        InputError, match=r"network\.onnx: answer: gives the id 26, which is not one of the 19 classes of cityscapes"
+    ):
         network.label(painted(["rb"]))
 
 
-def test_scores_that_are_not_a_number_are_refused(path):
+def test_scores_that_are_not_a_number_are_refused(path, three):
     nodes = [helper.make_node("Log", ["image"], ["answer"])]
     model = save(path, nodes, [tensor("image", [1, 3, "h", "w"])], [tensor("answer", [1, 3, "h", "w"])])
-    network = open_network(model, label_ids=True, mean=(0.5, 0.5, 0.5))
+    network = open_network(model, classes=three, mean=(0.5, 0.5, 0.5))
     with pytest.raises(InputError, match="answer: gives scores that are not a number"):
         network.label(painted(["rb"]))
 
 
-def test_failure_of_the_network_is_one_line(path):
+def test_failure_of_the_network_is_one_line(path, three):
     """A model that says it takes any size, but does not."""
     shape = helper.make_tensor("shape", TensorProto.INT64, [4], [1, 3, 2, 2])
     node = helper.make_node("Reshape", ["image", "shape"], ["answer"])
     model = save(path, [node], [tensor("image", [1, 3, "h", "w"])], [tensor("answer", [1, 3, 2, 2])], [shape])
-    network = open_network(model, label_ids=True)
+    network = open_network(model, classes=three)
     with pytest.raises(InputError, match=r"network\.onnx: image: the network failed: .*Reshape") as caught:
         network.label(painted(["rrrb"] * 4))
     assert "\n" not in str(caught.value)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch.nn.functional import interpolate
 
-from semgrid_eval.segmentation.network import best_class, nearest, network_input
+from semgrid_eval.segmentation.pixels import best_class, nearest, network_input
 
 SIDES = st.integers(1, 12)
 

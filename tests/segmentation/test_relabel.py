@@ -79,6 +79,8 @@ def test_log_says_what_made_its_labels(logs, model, tmp_path):
         assert log.scene.source_digest != source.scene.source_digest
     assert record["model"] == "network.onnx"
     assert record["config"]["mean"] == [0.0, 0.0, 0.0]
+    assert (record["classes"], record["device"]) == ("cityscapes", "cpu")
+    assert (record["labels"][0], record["labels"][13], len(record["labels"])) == ("road", "car", 19)
 
 
 def test_every_camera_gets_labels(model, tmp_path):
@@ -127,12 +129,15 @@ def test_changed_log_alone_is_written_again(logs, model):
     assert (summary.written, summary.skipped) == (["val/a"], ["val/b"])
 
 
-@pytest.mark.parametrize("change", ["model", "weights beside it", "option"])
+@pytest.mark.parametrize("change", ["model", "weights beside it", "option", "class map"])
 def test_changed_model_or_option_makes_all_anew(logs, model, change):
     segment([logs], model)
     config = CONFIG
     if change == "model":
         colour_network(model, colours={**TRAIN_COLOURS, 2: (0.0, 1.0, 0.0)})
+    elif change == "class map":
+        (model.parent / "own.yaml").write_text("{base: cityscapes, classes: {road: parking}}")
+        config = SegmentationConfig(**FLAT, classes=str(model.parent / "own.yaml"))
     elif change == "option":
         config = SegmentationConfig(**{**FLAT, "upsample": "nearest"})
     else:
@@ -163,7 +168,9 @@ def test_failure_of_the_network_is_a_failure_of_the_log(logs, model):
     colour_network(model, classes=34, colours={7: (1, 0, 0), 26: (0, 0, 1)}, ids=np.int64)
     summary = segment([logs], model)
     assert list(summary.failed) == ["val/a", "val/b"]
-    assert summary.failed["val/a"].endswith("network.onnx: answer: gives the id 26, which is not a train id")
+    assert summary.failed["val/a"].endswith(
+        "network.onnx: answer: gives the id 26, which is not one of the 19 classes of cityscapes"
+    )
 
 
 @pytest.mark.parametrize("out", ["logs", ".", "logs/labelled"])

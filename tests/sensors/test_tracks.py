@@ -118,6 +118,7 @@ def test_ground_ends_at_the_range(tmp_path):
         ({"length_m": math.nan}, "actor 1: is nan x 2 m; 0 to 200 m are allowed"),
         ({"width_m": -1.0}, "actor 1: is 4 x -1 m; 0 to 200 m are allowed"),
         ({"length_m": 1e9}, r"actor 1: is 1e\+09 x 2 m; 0 to 200 m are allowed"),
+        ({"velocity_x_mps": math.inf}, "actor 1: has a height or velocity that is not finite"),
         ({"label_id": 300}, "actor 1: has label 300"),
     ],
 )

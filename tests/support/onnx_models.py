@@ -6,6 +6,9 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from semgrid_eval.classes import CITYSCAPES_LABELS
+from semgrid_eval.segmentation.config import SegmentationConfig
+
 OPSET, IR_VERSION = 17, 8  # old enough for every ONNX Runtime that is allowed
 FLAT = {"mean": (0.0, 0.0, 0.0), "std": (1.0, 1.0, 1.0)}
 """Options with which a network sees colours in 0..1."""
@@ -57,10 +60,21 @@ def colour_network(
     return save(path, nodes, [given], [answer], constants)
 
 
-def save(path, nodes, inputs, outputs, constants=()):
+def toy_labeller(path: Path) -> Path:
+    """Write a network that knows the colours by which the toy world paints its labels."""
+    levels = {label.train_id: label.label_id * 7 / 255 for label in CITYSCAPES_LABELS if label.train_id < 19}
+    config = SegmentationConfig()
+    painted = {
+        number: tuple((level - mean) / std for mean, std in zip(config.mean, config.std, strict=True))
+        for number, level in levels.items()
+    }
+    return colour_network(path, colours=painted)
+
+
+def save(path, nodes, inputs, outputs, constants=(), opset=OPSET):
     """Write a model of these parts."""
     graph = helper.make_graph(nodes, "network", inputs, outputs, list(constants))
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", opset)], ir_version=IR_VERSION)
     onnx.checker.check_model(model)
     path.write_bytes(model.SerializeToString(deterministic=True))
     return path

@@ -31,8 +31,6 @@ _GPS_FIELDS = {"latitude_deg": "gpsLatitude", "longitude_deg": "gpsLongitude", "
 
 def read_file(path: Path) -> bytes:
     """Read a whole file of at most 256 MiB."""
-    if not path.exists():
-        raise InputError("is missing", path=path)
     return read_bytes(path, limit=MAX_FILE_BYTES)
 
 
@@ -95,8 +93,6 @@ def read_label(path: Path, *, train_ids: bool) -> tuple[bytes, PngHeader]:
 
 
 def _read_object(path: Path) -> dict[str, Any]:
-    if not path.exists():
-        raise InputError("is missing", path=path)
     content = read_json(path, limit=MAX_FILE_BYTES)
     if not isinstance(content, dict):
         raise InputError("is not a JSON object", path=path)

@@ -27,7 +27,7 @@ from pathlib import Path
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.faults import not_one_of
-from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
+from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs, how_to_label
 from semgrid_eval.sources.cityscapes.sequence import CityscapesSequence, SequenceFrame, frame_name, sibling
 from semgrid_eval.sources.cityscapes.source import CityscapesOptions
 
@@ -172,5 +172,10 @@ def convert_cityscapes(options: CityscapesOptions, out: Path, work: Work = IN_PR
     Raises:
         InputError: the tree or an option cannot be used, or the disk is full.
     """
-    jobs = [ConversionJob(s.name, s.split, s.digest, s.recording) for s in find_sequences(options)]
-    return convert_jobs(jobs, out, work)
+    sequences = find_sequences(options)
+    summary = convert_jobs([ConversionJob(s.name, s.split, s.digest, s.recording) for s in sequences], out, work)
+    kept = (each for each in sequences if f"{each.split}/{each.name}" not in summary.failed)
+    frames = [frame for each in kept for frame in each.frames]
+    if unlabelled := sum(not frame.labels for frame in frames):
+        summary.remark = f"{unlabelled} of {len(frames)} frames have no labels: {how_to_label(out)}"
+    return summary

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
+from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs, how_to_label
 from semgrid_eval.sources.kitti.sequence import KittiSequence, Part, camera0_at
 from semgrid_eval.sources.kitti.source import KittiOptions
 from semgrid_eval.sources.parts import count_of_parts, equal_parts
@@ -39,7 +39,7 @@ def convert_kitti(options: KittiOptions, out: Path, work: Work = IN_PROCESS) -> 
         sequences.append(sequence)
         jobs += [ConversionJob(each.name, each.split, each.digest, each.recording) for each in parts]
     summary = convert_jobs(jobs, out, work)
-    summary.remark = _remark(sequences)
+    summary.remark = _remark(sequences, out)
     return summary
 
 
@@ -86,7 +86,7 @@ def _parts(sequence: KittiSequence, options: KittiOptions) -> Iterator[Part]:
         yield Part(sequence, start, stop, options.split)
 
 
-def _remark(sequences: list[KittiSequence]) -> str:
+def _remark(sequences: list[KittiSequence], out: Path) -> str:
     """Say in one line what is not there."""
     unlabelled = [
         each.folder.name for each in sequences if "velodyne" in each.channels and "labels" not in each.channels
@@ -97,4 +97,6 @@ def _remark(sequences: list[KittiSequence]) -> str:
         parts.append(f"scans without labels, of which no grid can be made: {', '.join(unlabelled)}")
     if blind:
         parts.append(f"no pairs of images, so no camera: {', '.join(blind)}")
+    if seen := [each.folder.name for each in sequences if "image_2" in each.channels]:
+        parts.append(f"no labels for the cameras of {', '.join(seen)}: {how_to_label(out)}")
     return "; ".join(parts)

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from semgrid_eval.executors import WorkerDied, local_executor
-from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
+from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs, how_to_label
 from semgrid_eval.recording.disparity import CODING_ERROR_PX, LARGEST_PX
 from semgrid_eval.sources.ros2.bag import name_of
 from semgrid_eval.sources.ros2.inspection import inspect_bags
@@ -66,8 +66,7 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
         parts.append(f"{repeated} messages with a stamp that was there before left out")
     unlabelled = [name for name, camera in mapping.cameras.items() if camera.labels is None]
     if unlabelled:
-        command = f"semgrid-eval segment {out} --model NETWORK.onnx --out LABELLED"
-        parts.append(f"no labels for {', '.join(unlabelled)}: add them with {command}")
+        parts.append(f"no labels for {', '.join(unlabelled)}: {how_to_label(out)}")
     if bare := [name for name, lidar in mapping.lidars.items() if lidar.label_field is None]:
         advice = "a grid needs `label_field` in the map, or a camera to colour them: `colour_from` of the sensor"
         parts.append(f"points of {', '.join(bare)} have no labels: {advice}")

@@ -61,7 +61,10 @@ def test_motion_leads_back_to_the_poses(tmp_path, yaw_rate):
 
 def test_a_pair_of_images_becomes_a_camera_with_disparity(tmp_path):
     folder = Sequence(images=True, frames=2).write(tmp_path / "src")
-    assert converted(tmp_path).remark == ""
+    told = (
+        f"no labels for the cameras of 03: add them with semgrid-eval segment {tmp_path / 'logs'} --model NETWORK.onnx"
+    )
+    assert converted(tmp_path).remark == f"{told} --out LABELLED"
     with LogReader(find_logs(tmp_path / "logs")[0]) as log:
         calibration = log.calibration("left")
         frames = list(log.frames("left", images=True))

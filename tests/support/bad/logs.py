@@ -17,9 +17,11 @@ from support.driving import driving
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.log import topics
+from semgrid_eval.log.codec import PLAYBACK_RECORD, PREDICTIONS_RECORD
 from semgrid_eval.log.schemas.egomotion_pb2 import Egomotion
 from semgrid_eval.log.schemas.stereo_calibration_pb2 import StereoCalibration
 from semgrid_eval.log.store import write_log
+from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.recording.png import encode_gray
 from semgrid_eval.recording.types import Moment
 
@@ -179,6 +181,11 @@ KIND = Kind(
         _log("a yaw rate of 9 rad/s", lambda: again(_decoded(MOTION, Egomotion, yaw_rate_radps=9.0))),
         _log("a label image that cannot be decoded", lambda: again(_broken(LABEL, b"\xff\xff"))),
         _log("messages of another type", lambda: again(types={DISPARITY: "foxglove.Grid"}), "check logs"),
+        _log("labels of another type", lambda: again(types={LABEL: "foxglove.RawImage"})),
+        _log("motion of another type", lambda: again(types={MOTION: "foxglove.PoseInFrame"})),
+        _log("a true actor at no finite place", lambda: _actors(x_m=float("nan")), "check logs"),
+        _log("a run that `play` wrote", lambda: _other_kind(PLAYBACK_RECORD), "check logs"),
+        _log("predictions", lambda: _other_kind(PREDICTIONS_RECORD)),
         _log("a label image of another size", lambda: _pictures(label_png=SMALL), "check logs"),
         _log("a disparity image of 8 bit", lambda: again(_png(DISPARITY, encode_gray(np.zeros((16, 32), np.uint8))))),
         _log("a label image that is cut", lambda: again(_png(LABEL, SMALL[:-20]))),
@@ -207,6 +214,16 @@ KIND = Kind(
         _log("a folder that is called like a log", lambda: (LOG.unlink(), LOG.mkdir())),
     ),
 )
+
+
+def _actors(**values: object) -> None:
+    """Write the log again with other true actors."""
+    _frames(lambda moment: replace(moment, actors=tuple(replace(actor, **values) for actor in moment.actors)))
+
+
+def _other_kind(record: str) -> None:
+    with LOG.open("wb") as stream, MessageWriter(stream) as writer:
+        writer.metadata(record, {"recording": "street"})
 
 
 def _png(topic: str, png: bytes) -> Message:

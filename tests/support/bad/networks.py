@@ -24,6 +24,7 @@ def whole() -> None:
     picture = cv2.imencode(".png", np.zeros((16, 32, 3), np.uint8))[1].tobytes()
     _write(lambda frame: replace(frame, image_file=picture))
     colour_network(Path("net.onnx"), colours=COLOURS)
+    Path("three.yaml").write_text("classes: {none: unlabeled, ground: road, thing: car}")
 
 
 def _write(change: object) -> None:
@@ -60,6 +61,22 @@ def _given(words: str, more: str) -> Bad:
     return Bad(words, f"{SEGMENT} {more}")
 
 
+def _map(words: str, text: str) -> Bad:
+    return Bad(f"class map: {words}", f"{SEGMENT} --classes own.yaml", {"own.yaml": text.encode()})
+
+
+MAPS = {
+    "an unknown label": "classes: {street: rode, wheels: car}",
+    "a label that is a number": "classes: {street: 7, wheels: 26}",
+    "one class": "classes: {street: road}",
+    "another number of classes": "classes: {street: road, wheels: car}",
+    "an index that is missing": 'classes: {"0": road, "2": car}',
+    "names beside indices": 'classes: {"0": road, wheels: car}',
+    "an unknown base": "{base: kitti, classes: {street: road}}",
+    "a class that the base does not have": "{base: ade20k, classes: {street: road}}",
+    "an index beyond the base": '{base: cityscapes, classes: {"19": car}}',
+    "no classes": "base: ade20k",
+}
 TWO = [helper.make_node("Add", ["left", "right"], ["answer"])]
 SHAPE = numpy_helper.from_array(np.array([1, 3, 2, 2], np.int64), "shape")
 NAN = [helper.make_node("Sub", ["image", "image"], ["zero"]), helper.make_node("Div", ["zero", "zero"], ["answer"])]
@@ -94,14 +111,15 @@ KIND = Kind(
             [_tensor("image", IMAGE, TensorProto.UINT8)],
             [_tensor("answer", IMAGE, TensorProto.UINT8)],
         ),
-        _colours("channels last, without --layout", shape=(1, "h", "w", 3), nhwc=True),
+        _colours("--layout nchw, and channels last", " --layout nchw", shape=(1, "h", "w", 3), nhwc=True),
         _given("--layout nhwc, and channels first", "--layout nhwc"),
         _colours("a fixed size and another --size", " --size 16 16", shape=(1, 3, 8, 4)),
         _colours("a fixed size of 0", shape=(1, 3, 0, 4)),
         _given("a size beyond all pictures", "--size 8192 8193"),
         _colours("18 classes", classes=18),
         _colours("20 classes", classes=20),
-        _colours("35 classes with --label-ids", " --label-ids", classes=35),
+        _colours("150 classes, without --classes ade20k", classes=150),
+        _colours("35 classes with --classes cityscapes-ids", " --classes cityscapes-ids", classes=35),
         _net(
             "scores of whole numbers",
             [helper.make_node("Cast", ["image"], ["answer"], to=TensorProto.INT64)],
@@ -119,10 +137,10 @@ KIND = Kind(
             [helper.make_node("Concat", ["image", "image"], ["answer"], axis=0)],
             [_tensor("image", IMAGE)],
             [_tensor("answer", (2, 3, "h", "w"))],
-            more=" --label-ids",
+            more=" --classes three.yaml",
         ),
         Bad(
-            "ids that are no train ids",
+            "ids beyond the classes",
             SEGMENT,
             spoil=lambda: colour_network(Path("net.onnx"), classes=34, colours={26: (0.0, 0.0, 0.0)}, ids=np.int64),
         ),
@@ -131,16 +149,20 @@ KIND = Kind(
             NAN,
             [_tensor("image", IMAGE)],
             [_tensor("answer", IMAGE)],
-            more=" --label-ids",
+            more=" --classes three.yaml",
         ),
         _net(
             "it fails while it works",
             [helper.make_node("Reshape", ["image", "shape"], ["answer"])],
             [_tensor("image", IMAGE)],
             [_tensor("answer", (1, 3, 2, 2))],
-            more=" --label-ids",
+            more=" --classes three.yaml",
             constants=(SHAPE,),
         ),
+        *(_map(words, text) for words, text in MAPS.items()),
+        _given("a class map that is not there", "--classes cityscape"),
+        _given("--device cuda, where ONNX Runtime has none", "--device cuda"),
+        _given("--device gpu", "--device gpu"),
         _given("--std 0", "--std 0 1 1"),
         _given("--mean that is not finite", "--mean nan 0 0"),
         _given("--size 0", "--size 0 4"),

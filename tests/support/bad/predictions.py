@@ -12,7 +12,8 @@ from support.toy_world import FRAME_NS, START_NS
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.grids.spec import GridSpec
-from semgrid_eval.log.predictions import RECORD, TOPIC, Prediction, prediction_message
+from semgrid_eval.log.codec import PREDICTIONS_RECORD
+from semgrid_eval.log.predictions import TOPIC, Prediction, prediction_message
 from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.runs.recorded import extent_of
 
@@ -49,7 +50,7 @@ def _write(
     path.parent.mkdir(exist_ok=True)
     with path.open("wb") as stream, MessageWriter(stream) as writer:
         if record is not None:
-            writer.metadata(RECORD, record)
+            writer.metadata(PREDICTIONS_RECORD, record)
         for place, each in enumerate(answers):
             message = prediction_message(each, PLACE)
             change(message)
