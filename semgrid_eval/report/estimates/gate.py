@@ -169,5 +169,6 @@ def _verdict(scores: Scores, pair: tuple[Row, Row], limit: Limit) -> Verdict:
     if not isfinite(difference.value):
         raise InputError(f"row {other.record.name} has no cell of {limit.column}", path=other.run)
     if not isfinite(difference.high):
-        raise InputError(f"row {other.record.name} has one recording: an interval needs more", path=other.run)
+        reason = f"one recording alone has cells of {limit.column}: an interval needs more"
+        raise InputError(f"row {other.record.name}: {reason}", path=other.run)
     return Verdict(other.record.name, limit, difference)

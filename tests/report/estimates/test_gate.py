@@ -108,7 +108,9 @@ def test_rows_with_other_targets_are_refused_with_what_differs(runs):
 
 
 def test_what_no_limit_could_be_held_to_is_refused(runs):
-    with pytest.raises(InputError, match="row BL-DC has one recording: an interval needs more"):
+    with pytest.raises(
+        InputError, match="row BL-DC: one recording alone has cells of mean_known: an interval needs more"
+    ):
         gate(runs, "one", "one")
     rows = counted_row("one", {"car": [50, 50]}), counted_row("other", {"car": [40, 40]})
     with pytest.raises(InputError, match="row other has no cell of road"):
