@@ -75,7 +75,8 @@ def command(
     """Train and score every row of MATRIX, a YAML file or the name of a preset.
 
     Finished work is kept; run the same command again to continue. A row that fails is noted
-    with its reason, the others go on, and the exit code is 1.
+    with its reason, the others go on, and the exit code is 1. A row that asks for a truth that the logs do not hold is
+    skipped, with its reason, and is no failure.
 
     Rows can be spread over processes of this machine (--jobs) or over a Ray cluster (--executor ray), whose machines
     must all reach the folders of logs, grids and the run under the same paths.
@@ -117,7 +118,9 @@ def _run(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -> int:
 
 
 def show_run(record: "RunRecord", rows: Collection[str]) -> int:
-    """Print which of the named rows and which logs failed, and return the exit code."""
+    """Print which of the named rows and which logs failed, or cannot be, and return the exit code."""
+    for row in (row for row in record.rows if row.skipped and row.name in rows):
+        complain(f"Warning: row {row.name} is skipped: {row.skipped}")
     failed = [row for row in record.rows if row.failure and row.name in rows]
     for row in failed:
         complain(f"Error: row {row.name}: {row.failure}")

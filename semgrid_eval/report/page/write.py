@@ -43,19 +43,19 @@ def write_report(
 
     Args:
         run: the folder of a run, or several.
-        out: the folder to write; `report` in the (first) run where it is not given. A report there is replaced in one
-            step, files in it that are not the report's stay, and others that write there at the same time wait.
+        out: the folder to write; `report` in the run where it is not given, but several runs need one. A report there
+            is replaced in one step, files in it that are not the report's stay, and others that write there at the same
+            time wait.
         resample: what is resampled first: recordings, or groups of them (towns, cities, drives).
         progress: told of each row read.
         damaged: told of each file of a run that is damaged, lost or another's, in one line; the page says it, too.
 
     Raises:
-        InputError: a run's record cannot be read, or `out` holds something other than a report.
+        InputError: a run's record cannot be read or is given twice, or `out` is missing or holds something other than
+            a report.
     """
     folders = [run] if isinstance(run, Path) else list(run)
-    if not folders:
-        raise InputError("no run is given", field="run")
-    out = folders[0] / "report" if out is None else out
+    out = _checked(folders, out)
     check_replaceable(out)
     material = gather(load_runs(folders, progress=progress), Resampling(SEED, level=resample))
     with locked(out.parent, f".{out.name}.lock"):
@@ -72,6 +72,18 @@ def write_report(
         for fault in each.damages:
             damaged(f"{fault.kind} {fault.name}: {fault.reason}")
     return out / PAGE
+
+
+def _checked(folders: Sequence[Path], out: Path | None) -> Path:
+    """Return the folder to write, after looking whether the runs are several and each is another one."""
+    if not folders:
+        raise InputError("no run is given", field="run")
+    for at, folder in enumerate(folders):
+        if folder.resolve() in {other.resolve() for other in folders[:at]}:
+            raise InputError("is given twice", path=folder, field="run")
+    if out is None and len(folders) > 1:
+        raise InputError("the report of several runs belongs to none of them: name a folder", field="out")
+    return folders[0] / "report" if out is None else out
 
 
 def render_page(material: Material) -> str:

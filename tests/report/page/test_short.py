@@ -16,7 +16,10 @@ def test_who_wins_by_how_much_and_how_sure_stands_on_the_first_screen(browser, r
     parts = browser.execute_script(script)
     assert max(bottom for _, bottom in parts) <= SCREEN["height"]
     text = " ".join(words for words, _ in parts)
-    assert "Like for like (2 inputs, sensor front, 0.29 s ahead; 6 rows), RN-DC has the highest mean class IoU" in text
+    assert (
+        "Like for like (2 inputs, sensor front, 0.29 s ahead; 6 rows), RN-DC has the highest mean IoU of known classes"
+        in text
+    )
     assert "Of all 26 rows with these targets, RN-SL5 is best" in text
     assert "It differs in what it is given or asked: 5 inputs instead of 2 inputs." in text
     assert text.count("95% interval") == 2

@@ -1,0 +1,61 @@
+"""Scores by distance from the vehicle, for the rows that are asked what most rows are asked."""
+
+from collections.abc import Sequence
+
+import matplotlib as mpl
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from semgrid_eval.report.estimates.bootstrap import LABELS, Parts, RowScores
+from semgrid_eval.report.figures.style import (
+    INK,
+    SETTINGS,
+    Plot,
+    evidence,
+    finish,
+    line_style,
+    mark,
+    mark_legend,
+    short,
+)
+from semgrid_eval.report.rows.load import Row
+from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, main_group, rows_alike
+
+_CAPTION = "IoU by distance from the vehicle, with 95% intervals, of the rows that are asked the same as most others"
+
+
+def distance_plots(parts: Parts, rows: Sequence[Row]) -> list[Plot]:
+    """Draw a panel for each category over the bands of distance; nothing where results do not know these."""
+    group = main_group(rows)
+    if not group or len(parts) < 2:
+        return []
+    drawn = [row for row in rows_alike(group[0], rows) if row in group or row.uses_truth]
+    lines = [[scores[row.name] for scores in parts.values() if row.name in scores] for row in drawn]
+    lines = [line for line in lines if len(line) == len(parts)]
+    with mpl.rc_context(SETTINGS):
+        figure = Figure(figsize=(11.3, 2.7), layout="constrained")
+        panels = figure.subplots(1, len(DIFFERENCE_COLUMNS), sharex=True)
+        for axes, column in zip(panels, DIFFERENCE_COLUMNS, strict=True):
+            for index, line in enumerate(lines):
+                _draw(axes, line, column, index)
+            axes.set_title(LABELS[column], loc="left", fontweight="bold")
+            axes.set_xticks(
+                range(len(parts)), [name.removesuffix(" m").replace(" to ", "\N{EN DASH}") for name in parts]
+            )
+            axes.tick_params(axis="x", labelsize=7)
+        panels[0].set_ylabel("IoU")
+        mark_legend(panels[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1)), [[e[0].row] for e in lines])
+        figure.supxlabel("distance / m", fontsize=9)
+        caption = f"{_CAPTION} ({evidence({line[0].row.name: line[0] for line in lines})})."
+        return [finish(figure, "distance", "summary.csv", caption)]
+
+
+def _draw(axes: Axes, line: Sequence[RowScores], column: str, index: int) -> None:
+    row, estimates, places = line[0].row, [entry.estimate(column) for entry in line], range(len(line))
+    style = {"color": INK, "linestyle": ":"} if row.uses_truth else line_style(index)
+    values, label = [each.value for each in estimates], short(row.name)
+    drawn: list[Artist] = [*axes.plot(places, values, marker="o", markersize=3, label=label, **style)]
+    low, high = [each.low for each in estimates], [each.high for each in estimates]
+    drawn.append(axes.fill_between(places, low, high, color=style["color"], alpha=0.1, linewidth=0))
+    mark([row], *drawn)
