@@ -19,6 +19,8 @@ from semgrid_eval.report.estimates.paces import EDGES_MPS
 from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, SHARE_ENDS, class_style
 from semgrid_eval.report.examples.errors import FEWEST_WINDOWS, error_maps
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
+from semgrid_eval.report.examples.reel import make_reel
+from semgrid_eval.report.examples.stream_reel import stream_reel
 from semgrid_eval.report.page import exports, provenance
 from semgrid_eval.report.page.chart import draw_chart
 from semgrid_eval.report.page.chooser import chooser_axes
@@ -106,7 +108,7 @@ def _frame(material: Material) -> dict[str, Any]:
     """Return what the page is made with, and what its parts share."""
     return {
         "style": Markup(class_style()) + _source("style.css") + _source("examples.css"),
-        "script": Markup().join(map(_source, ("page.js", "chooser.js", "examples.js", "colours.js"))),
+        "script": Markup().join(map(_source, ("page.js", "chooser.js", "examples.js", "reel.js", "colours.js"))),
         "version": __version__,
         "runs": material.runs,
         "title": title_of(material.runs),
@@ -128,9 +130,12 @@ def _verdict(material: Material, found: Headline | None) -> dict[str, Any]:
 def _pictures(material: Material, found: Headline | None) -> dict[str, Any]:
     """Return examples and maps of errors, of rows that are no streams, which keep no predictions."""
     rows = [entry.row for entry in material.scores.values() if not entry.row.is_stream]
-    examples = example_groups(material.runs, rows, None if found is None or found.best.is_stream else found)
+    shown = None if found is None or found.best.is_stream else found
+    examples = example_groups(material.runs, rows, shown)
     return {
         "examples": examples,
+        "reel": make_reel(material.scores, rows, shown),
+        "stream_reel": stream_reel(material.streams),
         "gaps": gaps(rows, examples),
         "widths": widths(rows),
         "legend": (*CLASS_LEGEND, MASK_LEGEND),

@@ -6,6 +6,7 @@ from support.browser import open_page
 SCREEN = {"width": 1280, "height": 800}
 MOST_SCREENS, MOST_WORDS = 12, 3500
 """Outside of what is folded, for a run of the shape of the reference run."""
+MOST_BYTES = 3_000_000
 
 
 def test_who_wins_by_how_much_and_how_sure_stands_on_the_first_screen(browser, reference_page):
@@ -32,6 +33,7 @@ def test_the_page_of_a_reference_run_is_short(browser, reference_page):
     high, text = browser.execute_script("return [document.documentElement.scrollHeight, document.body.innerText]")
     assert high <= MOST_SCREENS * SCREEN["height"]
     assert 500 < len(text.split()) <= MOST_WORDS
+    assert reference_page.stat().st_size < MOST_BYTES
 
 
 @pytest.mark.parametrize("name", ["reference_page", "side_by_side"])
