@@ -27,12 +27,9 @@ _CAPTION = "IoU by distance from the vehicle, with 95% intervals, of the rows th
 
 def distance_plots(parts: Parts, rows: Sequence[Row]) -> list[Plot]:
     """Draw a panel for each category over the bands of distance; nothing where results do not know these."""
-    group = main_group(rows)
-    if not group or len(parts) < 2:
+    lines = _lines(parts, rows)
+    if not lines or len(parts) < 2:
         return []
-    drawn = [row for row in rows_alike(group[0], rows) if row in group or row.uses_truth]
-    lines = [[scores[row.name] for scores in parts.values() if row.name in scores] for row in drawn]
-    lines = [line for line in lines if len(line) == len(parts)]
     with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=(11.3, 2.7), layout="constrained")
         panels = figure.subplots(1, len(DIFFERENCE_COLUMNS), sharex=True)
@@ -49,6 +46,14 @@ def distance_plots(parts: Parts, rows: Sequence[Row]) -> list[Plot]:
         figure.supxlabel("distance / m", fontsize=9)
         caption = f"{_CAPTION} ({evidence({line[0].row.name: line[0] for line in lines})})."
         return [finish(figure, "distance", "summary.csv", caption)]
+
+
+def _lines(parts: Parts, rows: Sequence[Row]) -> list[list[RowScores]]:
+    """Return the scores by band of the rows that have some in each."""
+    group = main_group([row for row in rows if row.results])
+    alike = [row for row in rows_alike(group[0], rows) if row in group or row.uses_truth] if group else []
+    found = [[scores[row.name] for scores in parts.values() if row.name in scores] for row in alike]
+    return [line for line in found if len(line) == len(parts)]
 
 
 def _draw(axes: Axes, line: Sequence[RowScores], column: str, index: int) -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.fake_run import counted_row
 from support.scoring import score_rows
 from support.streams import stream
 
