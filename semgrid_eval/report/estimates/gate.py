@@ -164,7 +164,7 @@ def _refuse_half(pairs: Sequence[tuple[str, str]], before: Run, after: Run) -> N
 def _require_comparable(one: Row, other: Row) -> None:
     for row in (one, other):
         if not row.results:
-            reason = "; ".join(row.failures) or "its turn has not come"
+            reason = "; ".join(row.failures) or row.record.skipped or "its turn has not come"
             raise InputError(f"row {row.record.name} has no result to compare: {reason}", path=row.run)
     if not comparable(one, other):
         changed = ", ".join(changed_targets(settings_of(one), settings_of(other))) or "other logs or frames"

@@ -29,7 +29,7 @@ def test_rows_of_the_main_question_and_those_told_of_the_truth_are_drawn(rows):
     assert plot.source == "summary.csv"
     drawn = {int(number) for number in re.findall(r'data-row="(\d+)"', plot.inline_svg)}
     assert {row.name for row in rows if row.number in drawn} == {"BL-DC", "ED-DC", "truth-motion"}
-    for text in ("Mean (known)", "Small dynamic", "20\N{EN DASH}40", "beyond 60", "distance / m"):
+    for text in ("Mean (known)", "Small dynamic", "20\N{EN DASH}40", "&gt; 60", "distance / m"):
         assert text in plot.svg
     assert "3 windows a row, 3 recordings" in plot.caption
 
