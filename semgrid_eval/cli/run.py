@@ -84,7 +84,8 @@ def command(
     --model adds a row named after the class, with the defaults of MATRIX. Models of your own run in processes apart, so
     that one that hangs, crashes or ends its process is a row that fails; their code has all your rights there, too.
 
-    --dry-run builds the grids, which a run then finds, times a few updates of each network, and prints the plan.
+    --dry-run builds the grids, which a run then finds, times a few updates of each network and what is asked of one
+    log's truth, and prints the plan.
     """
     from semgrid_eval.executors import local_executor
     from semgrid_eval.models.device import visible_gpus
@@ -135,7 +136,8 @@ def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -
     units = plan_run(matrix, logs, out, options, stage=progress)
     click.echo("rows\tseed\twindows\tupdates\tsamples\tminutes\tstate")
     for unit in units:
-        state = unit.failure or ("done" if unit.done else "to do")
+        skipped = unit.skipped and f"skipped: {unit.skipped}"
+        state = unit.failure or skipped or ("done" if unit.done else "to do")
         numbers = (unit.seed if unit.seed is not None else "-", unit.windows, unit.updates, unit.samples)
         cells = (",".join(unit.rows), *numbers, f"{unit.seconds / 60:.1f}", state)
         click.echo("\t".join(printable(str(cell)) for cell in cells))
