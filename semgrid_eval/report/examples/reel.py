@@ -1,6 +1,7 @@
 """A grid of examples that plays: what was seen, what came and what rows said of it, moment by moment."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache, partial, reduce
 from itertools import groupby
@@ -23,7 +24,8 @@ MOST_MOMENTS = 10
 """At half a second each, nobody has to stop what plays by itself: it ends within five seconds."""
 _FEWEST_MOMENTS, _MOST_RIVALS, _BEST, _WORST = 3, 2, 2, 2
 Frames = Sequence[Frame | None]
-"""What a column of the grid shows of an example, by moment."""
+Column = Callable[[WindowRecord], Frames]
+"""Gives what a column of the grid shows of an example, by moment."""
 
 
 @dataclass(frozen=True)
@@ -52,18 +54,19 @@ class _Plan:
     title: str
     hint: str
     moments: Sequence[str]
-    columns: Mapping[str, Callable[[WindowRecord], Frames]]
+    columns: Sequence[tuple[str, Column]]
     windows: Sequence[WindowRecord]
 
     def draw(self) -> Reel:
         strips = (
             Strip(
                 f"{window.recording}, frame {window.target_frame}",
-                tuple(strip_picture(name, column(window)) for name, column in self.columns.items()),
+                tuple(strip_picture(name, column(window)) for name, column in self.columns),
             )
             for window in self.windows
         )
-        return Reel(self.title, self.hint, tuple(self.columns), tuple(self.moments), tuple(strips))
+        names = tuple(name for name, _ in self.columns)
+        return Reel(self.title, self.hint, names, tuple(self.moments), tuple(strips))
 
 
 class _Kept:
@@ -104,15 +107,14 @@ def make_reel(scores: Scores, rows: Sequence[Row], found: Headline | None) -> Re
     Recordings play over time where several windows of each are scored, else targets from farther and from nearer where
     a model was asked from several leads, else inputs up to the target.
     """
-    for contest in contests(rows, found)[:1]:
-        kept = _Kept()
-        for plan in (_over_time(contest, kept), _over_leads(scores, kept), _up_to_target(contest, kept)):
-            if plan is not None and plan.windows:
-                try:
-                    return plan.draw()
-                except (SemgridError, ValueError, IndexError):  # `failures` names what is damaged
-                    return None
+    plan = next((_plan(scores, contest, _Kept()) for contest in contests(rows, found)), None)
+    with suppress(SemgridError, ValueError, IndexError):  # `failures` names what is damaged
+        return plan.draw() if plan is not None and plan.windows else None
     return None
+
+
+def _plan(scores: Scores, contest: Contest, kept: "_Kept") -> _Plan:
+    return _over_time(contest, kept) or _over_leads(scores, kept) or _up_to_target(contest, kept)
 
 
 def _picked(contest: Contest) -> list[WindowRecord]:
@@ -126,24 +128,24 @@ def _over_time(contest: Contest, kept: _Kept) -> _Plan | None:
     ordered = sorted(contest.result.record.windows, key=lambda window: (window.recording, window.target_stamp_ns))
     by_recording = {name: list(each) for name, each in groupby(ordered, key=lambda window: window.recording)}
     picked = [window for window in _picked(contest) if len(by_recording[window.recording]) >= _FEWEST_MOMENTS]
-    count = min((len(by_recording[window.recording]) for window in picked), default=0)
-    count, model, rivals = min(count, MOST_MOMENTS), contest.model, contest.rivals[:_MOST_RIVALS]
-    if not count:
+    if not picked:
         return None
+    count = min(MOST_MOMENTS, *(len(by_recording[window.recording]) for window in picked))
 
     def around(window: WindowRecord) -> list[WindowRecord]:
         others = by_recording[window.recording]
         start = min(max(0, others.index(window) - count // 2), len(others) - count)
         return others[start : start + count]
 
-    def over(give: Callable[[Row, WindowRecord], Frame | None], row: Row) -> Callable[[WindowRecord], Frames]:
+    def over(give: Callable[[Row, WindowRecord], Frame | None], row: Row) -> Column:
         return lambda window: [give(row, each) for each in around(window)]
 
+    model, rivals = contest.model, contest.rivals[:_MOST_RIVALS]
     first, *later = (window.target_stamp_ns for window in around(picked[0]))
     since = [f"{number} of {count}, {(ns - first) / 1e9:.1f} s" for number, ns in enumerate((first, *later), start=1)]
     hint = "Windows that follow each other: the newest input, the target, and what rows predicted."
-    columns = {"Newest input": over(kept.seen, model), "Target": over(kept.target, model)}
-    columns |= {row.name: over(kept.answer, row) for row in (model, *rivals)}
+    columns = [("Newest input", over(kept.seen, model)), ("Target", over(kept.target, model))]
+    columns += [(row.name, over(kept.answer, row)) for row in (model, *rivals)]
     return _Plan("Over time", hint, since, columns, picked)
 
 
@@ -156,15 +158,13 @@ def _over_leads(scores: Scores, kept: _Kept) -> _Plan | None:
     if not _FEWEST_MOMENTS <= len(line) == len(baselines):
         return None
 
-    def over(
-        give: Callable[[Row, WindowRecord], Frame | None], asked: Sequence[Row]
-    ) -> Callable[[WindowRecord], Frames]:
+    def over(give: Callable[[Row, WindowRecord], Frame | None], asked: Sequence[Row]) -> Column:
         return lambda window: [give(row, window) for row in asked]
 
     leads = [f"{row.shown.record.lead_s:.2f} s ahead" for row in line]
     hint = "The same targets from longer and then from shorter leads: the newest input, and what rows made of it."
-    columns = {"Newest input": over(kept.seen, line), "Target": over(kept.target, [line[-1]] * len(line))}
-    columns |= {_span(asked): over(kept.answer, asked) for asked in (line, baselines)}
+    columns = [("Newest input", over(kept.seen, line)), ("Target", over(kept.target, [line[-1]] * len(line)))]
+    columns += [(_span(asked), over(kept.answer, asked)) for asked in (line, baselines)]
     return _Plan("From farther and from nearer", hint, leads, columns, _picked(Contest(line[-1], (baselines[-1],))))
 
 
@@ -176,8 +176,9 @@ def _span(rows: Sequence[Row]) -> str:
 def _up_to_target(contest: Contest, kept: _Kept) -> _Plan:
     """Play inputs and then targets, where predictions appear."""
     model, picked = contest.model, _picked(contest)
-    steps = range(-min(model.record.facts.inputs, MOST_MOMENTS - 1), 0)
-    stamps_ns = [(window.target_stamp_ns - window.input_stamps_ns[step]) for window in picked[:1] for step in steps]
+    before_ns = [window.target_stamp_ns - ns for window in picked[:1] for ns in window.input_stamps_ns]
+    before_ns = before_ns[-MOST_MOMENTS + 1 :]
+    steps = range(-len(before_ns), 0)
 
     def seen(window: WindowRecord) -> Frames:
         return [*(kept.seen(model, window, step) for step in steps), kept.target(model, window)]
@@ -185,8 +186,8 @@ def _up_to_target(contest: Contest, kept: _Kept) -> _Plan:
     def answer(row: Row, window: WindowRecord) -> Frames:
         return [*[None] * len(steps), kept.answer(row, window)]
 
-    before = [f"{ns / 1e9:.2f} s before the target" for ns in stamps_ns]
+    before = [f"{ns / 1e9:.2f} s before the target" for ns in before_ns]
     hint = "What was seen, then the target, and what rows predicted of it."
-    columns: dict[str, Callable[[WindowRecord], Frames]] = {"Inputs, then the target": seen}
-    columns |= {row.name: partial(answer, row) for row in (model, *contest.rivals[:_MOST_RIVALS])}
+    columns: list[tuple[str, Column]] = [("Inputs, then the target", seen)]
+    columns += [(row.name, partial(answer, row)) for row in (model, *contest.rivals[:_MOST_RIVALS])]
     return _Plan("Up to the target", hint, [*before, "the target"], columns, picked)
