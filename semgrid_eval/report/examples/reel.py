@@ -152,7 +152,7 @@ def _over_time(contest: Contest, kept: _Kept) -> _Plan | None:
 def _over_leads(scores: Scores, kept: _Kept) -> _Plan | None:
     """Play targets from the longest lead to the shortest, for the model that was asked from most of them."""
     rows = [entry.row for entry in scores.values()]
-    lines = [[entry.row for entry in reversed(line)] for line in horizon_lines(scores)]
+    lines = [[entry.row for entry in reversed(line)] for line in horizon_lines(scores) if not line[0].row.is_stream]
     line = max((line for line in lines if not (line[0].is_baseline or line[0].uses_truth)), key=len, default=[])
     baselines = [row for row in (reference_of(row, rows) for row in line) if row is not None]
     if not _FEWEST_MOMENTS <= len(line) == len(baselines):
