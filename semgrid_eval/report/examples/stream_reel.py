@@ -39,7 +39,7 @@ def stream_reel(found: Sequence[Strategy]) -> Reel | None:
     measured = [Frame(first["target"][at], first["mask"][at] > 0) for at in moments]
     pictures = [strip_picture("Measured", measured), *(_answers(row, arrays, moments) for row, arrays in kept)]
     return Reel(
-        "As answers come",
+        "A recording, time by time",
         _HINT,
         ("Measured", *(row.name for row in rows)),
         tuple(f"{number} of {len(moments)}, {since:.1f} s" for number, since in enumerate(since_s, start=1)),
