@@ -20,7 +20,9 @@ _ROW = "Hold this row alone to --fail-below, or rows like 'BL-*', or NAME=OTHER;
 
 @click.command("report", epilog="Example: semgrid-eval report runs/first")
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Folder to write; `report` in the first run by default.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder to write; `report` in RUN by default, but several need one."
+)
 @click.option(
     "--resample",
     type=click.Choice(["recordings", "groups"]),

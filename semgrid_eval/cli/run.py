@@ -75,7 +75,8 @@ def command(
     """Train and score every row of MATRIX, a YAML file or the name of a preset.
 
     Finished work is kept; run the same command again to continue. A row that fails is noted
-    with its reason, the others go on, and the exit code is 1.
+    with its reason, the others go on, and the exit code is 1. A row that asks for a truth that the logs do not hold is
+    skipped, with its reason, and is no failure.
 
     Rows can be spread over processes of this machine (--jobs) or over a Ray cluster (--executor ray), whose machines
     must all reach the folders of logs, grids and the run under the same paths.
@@ -83,7 +84,8 @@ def command(
     --model adds a row named after the class, with the defaults of MATRIX. Models of your own run in processes apart, so
     that one that hangs, crashes or ends its process is a row that fails; their code has all your rights there, too.
 
-    --dry-run builds the grids, which a run then finds, times a few updates of each network, and prints the plan.
+    --dry-run builds the grids, which a run then finds, times a few updates of each network and what is asked of one
+    log's truth, and prints the plan.
     """
     from semgrid_eval.executors import local_executor
     from semgrid_eval.models.device import visible_gpus
@@ -117,7 +119,9 @@ def _run(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -> int:
 
 
 def show_run(record: "RunRecord", rows: Collection[str]) -> int:
-    """Print which of the named rows and which logs failed, and return the exit code."""
+    """Print which of the named rows and which logs failed, or cannot be, and return the exit code."""
+    for row in (row for row in record.rows if row.skipped and row.name in rows):
+        complain(f"Warning: row {row.name} is skipped: {row.skipped}")
     failed = [row for row in record.rows if row.failure and row.name in rows]
     for row in failed:
         complain(f"Error: row {row.name}: {row.failure}")
@@ -132,7 +136,8 @@ def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -
     units = plan_run(matrix, logs, out, options, stage=progress)
     click.echo("rows\tseed\twindows\tupdates\tsamples\tminutes\tstate")
     for unit in units:
-        state = unit.failure or ("done" if unit.done else "to do")
+        skipped = unit.skipped and f"skipped: {unit.skipped}"
+        state = unit.failure or skipped or ("done" if unit.done else "to do")
         numbers = (unit.seed if unit.seed is not None else "-", unit.windows, unit.updates, unit.samples)
         cells = (",".join(unit.rows), *numbers, f"{unit.seconds / 60:.1f}", state)
         click.echo("\t".join(printable(str(cell)) for cell in cells))

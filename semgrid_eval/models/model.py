@@ -56,7 +56,7 @@ class Model:
     """
 
     Settings: ClassVar[type[Config]] = Config  # strict configuration class of what a row may set under `settings`
-    words: ClassVar[str] = ""  # what it does, for labels; the name of the class, where it does not say
+    words: ClassVar[str] = ""  # what it does, for labels; else the first line of the class's docstring, or its name
     family: ClassVar[str] = (
         ""  # how figures group models, like `BL`; of one's own the class's name, where it does not say
     )

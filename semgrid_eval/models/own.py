@@ -129,8 +129,14 @@ def guarded(cls: object, spec: str, file: ModelFile | None) -> type[Model]:
             raise InputError(f"must be of type {needed}, not {value!r}", field=f"{spec}: {name}")
     guard = _GuardedNetwork if issubclass(cls, Network) else _Guarded
     facts = {"_own_name": spec, "_own_file": file, "family": cls.family or cls.__name__, "__module__": cls.__module__}
+    facts["words"] = cls.words or _first_line(cls.__doc__)
     unfitted = {} if cls.learns() else {"fit": Model.fit}  # the guard's own would look as if it learned
     return type(cls.__name__, (guard, cls), facts | unfitted)
+
+
+def _first_line(docstring: str | None) -> str:
+    """Return what a docstring says of its class at once, without the full stop; empty where it says nothing."""
+    return next(iter((docstring or "").strip().splitlines()), "").removesuffix(".")
 
 
 @contextmanager

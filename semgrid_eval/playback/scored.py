@@ -63,7 +63,9 @@ def find_row(record: results.RunRecord, name: str, run: Path) -> results.RowReco
         names = [row.name for row in record.rows]
         raise InputError(f"there is no row {name!r}, only {_listed(names)}{meant(name, names)}", path=run)
     if not row.results:
-        raise InputError(f"it has no result: {row.failure or results.NOT_RUN}", path=run, field=f"row {name}")
+        raise InputError(
+            f"it has no result: {row.failure or row.skipped or results.NOT_RUN}", path=run, field=f"row {name}"
+        )
     return row
 
 

@@ -28,6 +28,7 @@ class Outcome(NamedTuple):
     result_id: str | None
     failure: str | None
     left_out: dict[str, str]  # logs that gave no window, and why
+    skipped: str | None = None  # why the logs cannot tell what it asks for
 
 
 class Clock:
@@ -78,13 +79,16 @@ def _too_short(outcomes: Mapping[str, Outcome]) -> dict[str, str]:
 def _row_record(row: Row, first_seed: int, outcomes: Mapping[str, Outcome]) -> results.RowRecord:
     done = [outcomes[key] for key, _ in units_of(row, first_seed) if key in outcomes]
     failures = [outcome.failure for outcome in done if outcome.failure is not None]
+    skipped = next((outcome.skipped for outcome in done if outcome.skipped is not None), None)
     found = [outcome.result_id for outcome in done if outcome.result_id is not None]
     return results.RowRecord(
         facts=row.facts,
         name=row.name,
         label=row.label,
+        words=row.words,
         results=tuple(found),
         failure=failures[0] if failures else (None if done else results.NOT_RUN),
+        skipped=skipped,
     )
 
 

@@ -217,12 +217,17 @@ class Row(Config):
         )
 
     @property
+    def words(self) -> str:
+        """What its model does, in words."""
+        found = self.found_model()
+        return found.in_words(found.parse_settings(self.settings)) if found else self.model
+
+    @property
     def label(self) -> str:
         """Name and, in words, what the row does; the horizon is always said (reading 2)."""
-        found = self.found_model()
         horizon, lead_ms = self.scored_window.horizon_steps, self.scored_window.lead_ms
         steps = f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead"
-        parts = [found.in_words(found.parse_settings(self.settings)) if found else self.model, *self._inputs_in_words]
+        parts = [self.words, *self._inputs_in_words]
         if self.stream is None or self.stream.asked == "fixed":
             parts.append(steps if lead_ms is None else f"{lead_ms:g} ms ahead")
         parts += [each.words for each in (self.disturb, self.stream) if each]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import torch
 
-from semgrid_eval.errors import ConfigError, SemgridError, first_line
+from semgrid_eval.errors import ConfigError, SemgridError, UnknownTruthError, first_line
 from semgrid_eval.executors import Executor, InProcess, NoRoomError, WorkerDied
 from semgrid_eval.faults import not_one_of
 from semgrid_eval.grids.spec import GridConfig
@@ -236,6 +236,8 @@ def _worker_at(matrix: str, logs: Path, out: Path, options: RunOptions, threads:
 def _attempt(worker: Worker, unit: Unit) -> Outcome:
     try:
         job = worker.run(unit.row, unit.seed)
+    except UnknownTruthError as error:
+        return Outcome(None, None, {}, skipped=str(error))
     except Exception as error:
         reason = failure_of(error, unit.row)
         if reason is None:

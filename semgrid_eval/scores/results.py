@@ -66,6 +66,7 @@ class LogRecord(Config):
     dataset: str
     group: str = ""  # the town, city or drive that it belongs to; empty where it stands for itself
     checksums: bool = True  # whether it has them; without, damage cannot be seen
+    recovered: str = ""  # of a log that was recovered from a damaged one, what it lost
     fingerprint: str | None = None  # of a benchmark's log: what is compared with the published ones
 
 
@@ -110,13 +111,15 @@ class ResultRecord(Config):
 
 
 class RowRecord(Config):
-    """One row of the matrix; a failed row has a reason instead of results."""
+    """One row of the matrix; a row that failed, or that these logs cannot have, has a reason instead of results."""
 
     facts: RowFacts
     name: str  # unique in the run
-    label: str  # for readers: name and what it does
+    label: str  # for readers: name, what it does, and what it is asked
+    words: str = ""  # what its model does
     results: tuple[str, ...] = ()
     failure: str | None = None
+    skipped: str | None = None  # it asks for a truth that the logs do not hold
 
 
 class RunRecord(Config):

@@ -119,3 +119,19 @@ def test_a_gate_that_asks_for_what_is_not_there_is_refused(before_and_after, tmp
         assert (code, out) == (2, "")
         assert "--fail-below" in err
     assert not (tmp_path / "page").exists()
+
+
+def test_a_report_of_several_runs_needs_a_folder_of_its_own(before_and_after, capsys):
+    code, out, err = _run(capsys, "report", *before_and_after)
+    assert (code, out) == (1, "")
+    assert err == "Error: out: the report of several runs belongs to none of them: name a folder\n"
+    assert not any((run / "report").exists() for run in before_and_after)
+
+
+def test_a_run_that_is_given_twice_is_refused(before_and_after, tmp_path, capsys):
+    before, _ = before_and_after
+    same = before.parent / "other" / ".." / before.name
+    code, out, err = _run(capsys, "report", before, same, "--out", tmp_path / "page")
+    assert (code, out) == (1, "")
+    assert err == f"Error: {same}: run: is given twice\n"
+    assert not (tmp_path / "page").exists()

@@ -44,6 +44,11 @@ class Unprepared(Network):
         return {}["prior"]
 
 class Counted(Model):
+    '''Counts classes, cell by cell.
+
+    More of it.
+    '''
+
     family = "BL"
     files = ("table.txt",)
 
@@ -121,6 +126,7 @@ def test_what_a_class_says_of_itself_is_seen(own):
     assert [model.random for model in (newest, small, counted)] == [False, True, False]
     assert [model.files for model in (newest, small, counted)] == [None, (), ("table.txt",)]
     assert newest.in_words(newest.Settings()) == "Newest"
+    assert counted.in_words(counted.Settings()) == "Counts classes, cell by cell"
 
 
 def test_a_network_cannot_change_what_others_see(own, batch):

@@ -8,6 +8,7 @@ from support.toy_world import street
 
 from semgrid_eval.executors import InProcess
 from semgrid_eval.log.fingerprint import fingerprint
+from semgrid_eval.log.recover import recover_log
 from semgrid_eval.log.store import write_log
 from semgrid_eval.progress import silent_stage
 from semgrid_eval.runs.data import RunData
@@ -38,3 +39,15 @@ def test_the_logs_of_a_published_benchmark_alone_are_fingerprinted(logs, tmp_pat
         "town-v1/tiny": None,
         "own": None,
     }
+
+
+def test_a_log_that_was_recovered_says_what_it_lost(logs, tmp_path):
+    whole = (logs / "val" / "own.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) * 9 // 10])
+    recover_log(tmp_path / "cut.mcap", tmp_path / "logs" / "val" / "saved.mcap")
+    write_log(street(frames=3).recording("whole", "val"), tmp_path / "logs" / "val" / "whole.mcap")
+    found = data_of(tmp_path / "logs", tmp_path / "cache")
+    found.prepare()
+    told = {path: record.recovered for path, record in found.records.items()}
+    assert told["val/whole.mcap"] == ""
+    assert told["val/saved.mcap"].startswith("was recovered from a damaged log, of which ")

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+import yaml
 from support.drawn_again import write_town_like
-from support.small_runs import run, write_logs
+from support.small_runs import WINDOW, run, write_logs
 
 from semgrid_eval.executors import Processes
 from semgrid_eval.grids.draws import Draws
@@ -18,7 +19,10 @@ from semgrid_eval.models.model import Given
 from semgrid_eval.models.network import Network
 from semgrid_eval.models.registry import MODELS, find_model
 from semgrid_eval.runs.data import RunData
+from semgrid_eval.runs.matrix import load_matrix
+from semgrid_eval.runs.plan import plan_run
 from semgrid_eval.runs.row import Row
+from semgrid_eval.runs.runner import RunOptions
 from semgrid_eval.runs.truth import told
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
@@ -97,17 +101,43 @@ def test_a_second_target_changes_no_score_against_the_first(out, logs, tmp_path)
         assert not (folder_of(tmp_path / "run", name) / results.EXPECTED_FILE).exists()
 
 
-def test_on_logs_without_the_truth_such_rows_fail_in_a_line_and_others_go_on(tmp_path):
+def test_on_logs_without_the_truth_such_rows_are_skipped_in_a_line_and_others_go_on(tmp_path):
     logs = write_logs(tmp_path / "logs")
     record = run([*PLAIN, *TOLD, MOVED], logs, tmp_path / "run", second_target="expected")
-    failures = {row.name: row.failure for row in record.rows}
-    assert failures["BL-DC"] is failures["BL-Fuse"] is None
+    skipped = {row.name: row.skipped for row in record.rows}
+    assert skipped["BL-DC"] is skipped["BL-Fuse"] is None
+    assert not any(row.failure for row in record.rows)
     for name in ("top", "new"):
         assert re.fullmatch(
-            r"\S+toy2\.mcap: holds no exact pictures whose errors can be drawn again: .*", failures[name]
+            r"\S+toy2\.mcap: holds no exact pictures whose errors can be drawn again: .*", skipped[name]
         )
-    assert "which pixels show whom" in failures["moved"]
+    assert "which pixels show whom" in skipped["moved"]
     assert not (folder_of(tmp_path / "run", "BL-DC") / results.EXPECTED_FILE).exists()
+
+
+def _planned(rows, logs, folder, **defaults):
+    folder.mkdir(exist_ok=True)
+    path = folder / "m.yaml"
+    path.write_text(yaml.safe_dump({"seed": 5, "defaults": {"window": WINDOW, **defaults}, "rows": rows}))
+    planned = plan_run(load_matrix(str(path)), logs, folder / "run", RunOptions("cpu", folder / "grids", "test"))
+    return {unit.rows[0]: unit for unit in planned}
+
+
+def test_a_plan_prices_what_is_asked_of_the_truth_once_and_no_more_when_it_is_known(logs, tmp_path):
+    rows = [PLAIN[0], TOLD[1], {**TOLD[1], "name": "again", "mask_mode": "off"}]
+    found = _planned(rows, logs, tmp_path / "plan")
+    assert {name: unit.seconds > 0 for name, unit in found.items()} == {"BL-DC": False, "new": True, "again": False}
+    run(rows, logs, tmp_path / "plan" / "run")  # which finds its grids beside it
+    assert all(unit.seconds == 0 for unit in _planned(rows, logs, tmp_path / "plan").values())
+
+
+def test_a_plan_says_which_rows_are_skipped_for_lack_of_a_truth(tmp_path):
+    found = _planned([*PLAIN, *TOLD], write_logs(tmp_path / "logs"), tmp_path / "plan", second_target="expected")
+    assert {name: unit.skipped is not None for name, unit in found.items()} == {
+        **{"BL-DC": False, "BL-Fuse": False},
+        **{"top": True, "new": True},
+    }
+    assert not any(unit.failure for unit in found.values())
 
 
 def test_processes_give_the_same_as_this_one(out, logs, tmp_path):

@@ -48,6 +48,10 @@ class FakeRow:
         return f"{self.family}-{self.what}"
 
     @property
+    def words(self) -> str:
+        return "model-driven baseline" if self.facts.baseline else "network"
+
+    @property
     def facts(self) -> results.RowFacts:
         found = facts(self.family, self.sensors, self.horizon_steps, translate=self.translate)
         baseline = found.baseline if self.baseline is None else self.baseline
@@ -253,7 +257,8 @@ class _Maker:
         return results.RowRecord(
             facts=row.facts,
             name=row.name,
-            label=f"{row.name}: {'model-driven baseline' if row.facts.baseline else 'network'}",
+            label=f"{row.name} ({row.words}, 2 inputs)",
+            words=row.words,
             results=ids,
             failure=row.failure,
         )

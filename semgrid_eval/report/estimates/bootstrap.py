@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division, RowSums, row_sums
+from semgrid_eval.report.estimates.student import stretch
 from semgrid_eval.report.rows.load import Result, Row, comparable
-from semgrid_eval.scores.metrics.metric import Counts, Floats, Metric, column_names, divided, mean_finite
+from semgrid_eval.scores.metrics.metric import Counts, Floats, Metric, column_names, column_of, divided, mean_finite
 from semgrid_eval.scores.metrics.table import IOU, METRICS
 
 LEVEL = 0.95
@@ -26,12 +27,16 @@ Level = Literal["recordings", "groups"]
 DRAWS = 1000
 SEED = 20190623
 """Any number does; a fixed one gives the same run the same intervals."""
+_FEW = (
+    "The fewer of them have cells of a class, the longer the interval is made, by the t distribution; where one "
+    "alone has, there is none."
+)
 _SENTENCES: Mapping[Level, str] = {
     "recordings": "Intervals come from resampling recordings, taken as independent of each other, and seeds where "
-    "there are several. For recordings that depend on each other, semgrid-eval report --resample groups resamples "
-    "towns, cities or drives first.",
+    f"there are several. {_FEW} For recordings that depend on each other, semgrid-eval report --resample groups "
+    "resamples towns, cities or drives first.",
     "groups": "Intervals come from resampling groups of recordings (towns, cities or drives), then recordings within "
-    "each group, since recordings of one group may depend on each other, and seeds where there are several.",
+    f"each group, since recordings of one group may depend on each other, and seeds where there are several. {_FEW}",
 }
 
 
@@ -119,6 +124,7 @@ class RowScores:
     draws: Floats  # (B, Q) of their mean, resampled
     totals: Counts  # (S, *shape) sums over windows
     windows: int  # how many windows have something to count in the region
+    units: Counts  # (Q,) how many of what is resampled, recordings or groups, have cells behind each column
     by_inputs: bool = False  # whether rows of other inputs have other cells there
 
     @property
@@ -161,15 +167,41 @@ def weighted_sum(parts: Sequence[tuple[float, RowScores]], column: str) -> Estim
             raise ValueError(f"{first.row.name} and {entry.row.name} are scored on other targets or cells")
     at = column_names(first.metric).index(column)
     value = sum(weight * entry.mean[column] for weight, entry in parts)
-    return interval_of(value, np.sum([weight * entry.draws[:, at] for weight, entry in parts], axis=0))
+    draws = np.sum([weight * entry.draws[:, at] for weight, entry in parts], axis=0)
+    units = fewest_units([entry for _, entry in parts], column)
+    return interval_of(value, stretched(draws, units), _limits(parts, column))
 
 
-def interval_of(value: float, draws: Floats) -> Estimate:
-    """Give a value the interval of its draws (B,), of those that are finite."""
+def fewest_units(entries: Sequence[RowScores], column: str) -> int:
+    """Count the recordings, or groups, that have cells behind a column, of the row that has fewest of them."""
+    return min(int(entry.units[column_names(entry.metric).index(column)]) for entry in entries)
+
+
+def _limits(parts: Sequence[tuple[float, RowScores]], column: str) -> tuple[float, float]:
+    """Return between what a weighted sum of a column's values lies."""
+    ends = column_of(parts[0][1].metric, column).limits
+    lowest, highest = (sum(pick(weight * end for end in ends) for weight, _ in parts) for pick in (min, max))
+    return lowest, highest
+
+
+def stretched(draws: Floats, units: int) -> Floats:
+    """Move draws (B,) away from their middle until their interval is long enough for `units` recordings or groups.
+
+    Where one alone has something to count, it says nothing about others: no draw is left.
+    """
     finite = draws[np.isfinite(draws)]
-    if not np.isfinite(value) or len(finite) == 0:
+    if units < 2 or not len(finite):
+        return draws[:0]
+    middle = np.median(finite)
+    return np.asarray(middle + stretch(units, LEVEL) * (draws - middle))
+
+
+def interval_of(value: float, draws: Floats, limits: tuple[float, float] = (-np.inf, np.inf)) -> Estimate:
+    """Give a value the interval of its draws (B,), of those that are finite, within limits."""
+    finite = draws[np.isfinite(draws)]
+    if not np.isfinite(value) or not len(finite):
         return Estimate(value, np.nan, np.nan)
-    low, high = np.quantile(finite, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    low, high = np.quantile(finite, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]).clip(*limits)
     return Estimate(value, float(low), float(high))
 
 
@@ -201,12 +233,14 @@ def score_regions(rows: Sequence[Row], metric: Metric, division: Division, resam
 def _score_region(counted: Sequence[tuple[Row, RowSums]], metric: Metric, resampling: Resampling) -> Scores:
     seen = {name: row for row, sums in counted for part in sums.parts for name in part.recordings.tolist()}
     names = sorted(seen)
-    draws = resampling.draw([seen[name].group_of[name] for name in names], [len(sums.parts) for _, sums in counted])
-    return {row.name: _score_row(row, sums, metric, names, draws) for row, sums in counted}
+    groups = {name: seen[name].group_of[name] for name in names}
+    draws = resampling.draw(list(groups.values()), [len(sums.parts) for _, sums in counted])
+    unit_of = groups if resampling.level == "groups" else {name: name for name in names}
+    return {row.name: _score_row(row, sums, metric, unit_of, draws) for row, sums in counted}
 
 
-def _score_row(row: Row, sums: RowSums, metric: Metric, names: Sequence[str], draws: Draws) -> RowScores:
+def _score_row(row: Row, sums: RowSums, metric: Metric, unit_of: Mapping[str, str], draws: Draws) -> RowScores:
     by_seed = metric.figures(metric.ratios(sums.totals))
-    resampled = draws.over_seeds(metric.figures(draws.resampled(sums.by_recording(names))))
+    resampled = draws.over_seeds(metric.figures(draws.resampled(sums.by_recording(list(unit_of)))))
     results = tuple(part.result for part in sums.parts)
-    return RowScores(row, metric, results, by_seed, resampled, sums.totals, sums.windows)
+    return RowScores(row, metric, results, by_seed, resampled, sums.totals, sums.windows, sums.units(unit_of))

@@ -73,6 +73,7 @@ class ResultSums:
     result: Result
     recordings: NDArray[np.str_]  # (R,) names of those with something to count
     ratios: Counts  # (R, K, 2) their numerators and denominators
+    cells: Counts  # (R, Q) their cells behind each figure
     totals: Counts  # (*shape) sums over windows
     windows: int  # how many have something to count
 
@@ -92,6 +93,15 @@ class RowSums:
     def totals(self) -> Counts:
         """Sums over windows: (S, *shape)."""
         return np.stack([part.totals for part in self.parts])
+
+    def units(self, unit_of: Mapping[str, str]) -> Counts:
+        """Count the units, recordings or groups of them, that have cells behind each figure: (Q,)."""
+        known: dict[str, NDArray[np.bool_]] = {}
+        for part in self.parts:
+            for name, cells in zip(part.recordings.tolist(), part.cells, strict=True):
+                unit = unit_of[name]
+                known[unit] = known.get(unit, False) | (cells > 0)
+        return np.asarray(np.sum(list(known.values()), axis=0, dtype=np.int64))
 
     def by_recording(self, names: Sequence[str]) -> Counts:
         """Sums in the order of the given recordings: (R, S, K, 2)."""
@@ -114,9 +124,17 @@ def _by_region(result: Result, sums: NDArray[np.int32], metric: Metric) -> list[
     order = np.argsort(owner, kind="stable")
     starts = np.searchsorted(owner[order], np.arange(len(recordings)))
     counted = windows_with(sums)  # (N, regions)
-    ratios = metric.ratios(np.add.reduceat(sums[order], starts, axis=0, dtype=np.int64))  # (R, regions, K, 2)
+    pooled = np.add.reduceat(sums[order], starts, axis=0, dtype=np.int64)  # (R, regions, *shape)
+    ratios, cells = metric.ratios(pooled), metric.cells(pooled)  # (R, regions, K, 2), (R, regions, Q)
     seen, totals = np.logical_or.reduceat(counted[order], starts, axis=0), sums.sum(axis=0, dtype=np.int64)
     return [
-        ResultSums(result, recordings[mine], ratios[mine, number], totals[number], int(counted[:, number].sum()))
+        ResultSums(
+            result,
+            recordings[mine],
+            ratios[mine, number],
+            cells[mine, number],
+            totals[number],
+            int(counted[:, number].sum()),
+        )
         for number, mine in enumerate(seen.T)
     ]

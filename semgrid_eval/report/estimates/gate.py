@@ -144,16 +144,27 @@ def _named(asked: str, before: Run, after: Run) -> list[tuple[str, str]]:
     cuts = [(asked[:at], asked[at + 1 :]) for at, sign in enumerate(asked) if sign == "="]
     exact = [pair for pair in ((asked, asked), *cuts) if pair[0] in ours and pair[1] in theirs]
     found = exact[:1] or [(name, name) for name in ours if name in theirs and fnmatchcase(name, asked)]
+    if not found and cuts:
+        _refuse_half(cuts, before, after)
     if not found:
         shared = [name for name in ours if name in theirs]
         raise InputError(f"{asked!r} is not a row of both runs: {', '.join(shared)}{meant(asked, shared)}", field="row")
     return found
 
 
+def _refuse_half(pairs: Sequence[tuple[str, str]], before: Run, after: Run) -> None:
+    """Say which half of `NAME=OTHER` is not a row of its run."""
+    ours, theirs = _by_name(before), _by_name(after)
+    one, other = next((pair for pair in pairs if pair[0] in ours or pair[1] in theirs), pairs[0])
+    if one not in ours:
+        raise InputError(not_one_of(one, ours), path=before.folder, field="row")
+    raise InputError(not_one_of(other, theirs), path=after.folder, field="row")
+
+
 def _require_comparable(one: Row, other: Row) -> None:
     for row in (one, other):
         if not row.results:
-            reason = "; ".join(row.failures) or "its turn has not come"
+            reason = "; ".join(row.failures) or row.record.skipped or "its turn has not come"
             raise InputError(f"row {row.record.name} has no result to compare: {reason}", path=row.run)
     if not comparable(one, other):
         changed = ", ".join(changed_targets(settings_of(one), settings_of(other))) or "other logs or frames"
@@ -169,5 +180,6 @@ def _verdict(scores: Scores, pair: tuple[Row, Row], limit: Limit) -> Verdict:
     if not isfinite(difference.value):
         raise InputError(f"row {other.record.name} has no cell of {limit.column}", path=other.run)
     if not isfinite(difference.high):
-        raise InputError(f"row {other.record.name} has one recording: an interval needs more", path=other.run)
+        reason = f"one recording alone has cells of {limit.column}: an interval needs more"
+        raise InputError(f"row {other.record.name}: {reason}", path=other.run)
     return Verdict(other.record.name, limit, difference)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores, interval_of
+from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores, fewest_units, interval_of, stretched
 from semgrid_eval.report.estimates.streams import facts_of
 from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, settings_but
 from semgrid_eval.scores.metrics.metric import column_names
@@ -26,9 +26,12 @@ class LeadSeries:
         """Return the row with the highest value, and its lead in ms; the interval is that of the best lead by draw."""
         values = np.array([entry.mean[column] for entry in self.entries])
         at = column_names(self.entries[0].metric).index(column)
-        draws = np.nan_to_num(np.stack([entry.draws[:, at] for entry in self.entries]), nan=-np.inf)  # (L, B)
+        units = fewest_units(self.entries, column)
+        draws = np.stack([stretched(entry.draws[:, at], units) for entry in self.entries])  # (L, B)
         chosen = self.entries[int(np.nanargmax(values))] if np.isfinite(values).any() else self.entries[0]
-        return chosen, interval_of(lead_of(chosen), np.array(self.leads_ms)[draws.argmax(axis=0)])
+        return chosen, interval_of(
+            lead_of(chosen), np.array(self.leads_ms)[np.nan_to_num(draws, nan=-np.inf).argmax(axis=0)]
+        )
 
 
 def lead_of(entry: RowScores) -> float:

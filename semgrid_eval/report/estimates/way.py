@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores, interval_of
+from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores, fewest_units, interval_of, stretched
 from semgrid_eval.report.rows.load import Result, Row
 from semgrid_eval.report.rows.pairing import HEADLINE, way_of
 from semgrid_eval.scores.metrics.metric import column_names
@@ -27,7 +27,9 @@ class Way:
             return nothing
         length = self.upper.draws[:, at] - self.lower.draws[:, at]
         covered = np.where(length > 0, entry.draws[:, at] - self.lower.draws[:, at], np.nan)
-        return interval_of((entry.mean[column] - low) / (high - low), covered / np.where(length > 0, length, 1.0))
+        shares = covered / np.where(length > 0, length, 1.0)
+        units = fewest_units([self.lower, self.upper, entry], column)
+        return interval_of((entry.mean[column] - low) / (high - low), stretched(shares, units))
 
 
 def ways(scores: Scores, rows: Sequence[Row] = ()) -> Iterator[tuple[RowScores, Way]]:

@@ -2,6 +2,7 @@
 
 import base64
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -57,8 +58,28 @@ def grid_picture(
     title: str, alt: str, grid: Grid, mask: NDArray[np.bool_] | None = None, *, lead: bool = True
 ) -> Picture:
     """Draw a grid (H, W) in the colour-blind-safe class colours, which a page's reader may switch, mask M in white."""
-    shown = grid if mask is None else np.where(mask, MASKED, grid).astype(np.uint8)
-    return _class_picture(title, alt, shown, lead=lead)
+    return _class_picture(title, alt, Frame(grid, mask).shown, lead=lead)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A grid (H, W) to be shown for a moment, with mask M in white."""
+
+    grid: Grid
+    mask: NDArray[np.bool_] | None = None
+
+    @property
+    def shown(self) -> Grid:
+        """The grid with its mask."""
+        return self.grid if self.mask is None else np.where(self.mask, MASKED, self.grid).astype(np.uint8)
+
+
+def strip_picture(title: str, frames: Sequence[Frame | None]) -> Picture:
+    """Draw the grids of moments side by side, light gray where there is none."""
+    shape = next((frame.grid.shape for frame in frames if frame is not None), (1, 1))
+    nothing = np.full(shape, POINTLESS, np.uint8)
+    shown = [nothing if frame is None else frame.shown for frame in frames]
+    return _class_picture(title, f"{title}, at each moment", np.concatenate(shown, axis=1))
 
 
 def label_picture(title: str, alt: str, label: bytes, class_by_label: Grid) -> Picture:

@@ -28,6 +28,7 @@ class Group:
     problem: str
     looks_ahead: bool = False  # whether its rows look ahead differently far
     shown: bool = False  # whether the group is open when the page is opened
+    aside: bool = False  # whether it is about another row than the page's main one
 
 
 def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | None) -> list[Group]:
@@ -42,7 +43,8 @@ def example_groups(runs: Sequence[Run], rows: Sequence[Row], found: Headline | N
     read = lru_cache(1)(read_windows)  # contests that share windows are drawn one after the other
     order = sorted(range(len(chosen)), key=lambda i: chosen[i].model.window_set)
     drawn = {i: groups_of(chosen[i], plans[i], kept[chosen[i].model.run], read) for i in order}
-    first, *rest = (group for i in sorted(drawn) for group in drawn[i])
+    aside = {i for i, each in enumerate(chosen) if each.model != main.model}
+    first, *rest = (replace(group, aside=i in aside) for i in sorted(drawn) for group in drawn[i])
     return [replace(first, shown=True), *rest]
 
 

@@ -19,6 +19,7 @@ from semgrid_eval.report.estimates.paces import divisions
 from semgrid_eval.report.estimates.streams import WARM, Strategy, strategies
 from semgrid_eval.report.estimates.way import against_expected, order_of
 from semgrid_eval.report.figures import categories, curves, settings
+from semgrid_eval.report.figures.distance import distance_plots
 from semgrid_eval.report.figures.streams import stream_plots
 from semgrid_eval.report.figures.style import Plot
 from semgrid_eval.report.rows.load import Row, Run
@@ -29,6 +30,7 @@ from semgrid_eval.report.tables.streams import lead_table, stream_table, wins_ta
 from semgrid_eval.report.tables.table import Table
 from semgrid_eval.report.tables.truth import expected_table, order_sentence, way_table
 from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores.regions.distance import DISTANCE
 from semgrid_eval.scores.regions.table import PARTITIONS
 
 
@@ -64,6 +66,7 @@ def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
     tables = score_tables(scores, [each.tag for each in runs], {each.folder for each in runs if on_cityscapes(each)})
     figures = {
         "categories": categories.category_plots(scores),
+        "distance": distance_plots(everything["iou"][DISTANCE.name], rows),
         "horizon": categories.horizon_plots(scores),
         "training": curves.training_plots(rows),
         "calibration": curves.calibration_plots(everywhere(everything, "calibration")),

@@ -21,7 +21,7 @@ from semgrid_eval.sources.benchmarks import FINGERPRINT_CHARACTERS, published_fi
 
 @dataclass(frozen=True)
 class Failure:
-    """Something that failed, and why."""
+    """Something that failed or is not whole, and why."""
 
     kind: str
     name: str
@@ -29,10 +29,12 @@ class Failure:
 
 
 def failures(runs: Sequence[Run]) -> list[Failure]:
-    """List the rows, results and logs that failed."""
+    """List the rows, results and logs that failed or are not whole."""
     found = []
     for run in runs:
         found += [Failure("row", row.name, reason) for row in run.rows for reason in row.failures]
+        found += [Failure("skipped row", row.name, row.record.skipped) for row in run.rows if row.record.skipped]
+        found += [Failure("log", log.path, log.recovered) for log in run.record.logs if log.recovered]
         found += [Failure("log", *reason) for reason in sorted(run.record.failed_logs.items())]
         tag = f" ({run.tag})" if run.tag else ""
         found += [Failure(fault.kind, f"{fault.name}{tag}", fault.reason) for fault in run.faults]
@@ -123,7 +125,7 @@ def _state(row: Row) -> str:
     if row.is_left:
         return NOT_RUN
     if not row.results:
-        return "failed"
+        return "skipped" if row.is_skipped else "failed"
     trained = row.results[0].record.seed is not None
     return plural(len(row.results), "seed") if trained else "no training"
 

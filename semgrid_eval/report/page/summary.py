@@ -68,7 +68,7 @@ def _like_for_like(scores: Scores, found: Headline) -> Markup:
     several = found.compared < found.sharing
     asked = f"Like for like ({question_words(found.best, found.best)}; {plural(found.compared, 'row')}), " * several
     start = _say(
-        "{}{} has the highest mean class IoU, {} without unknown", asked, _name(found.best), number(best.mean[HEADLINE])
+        "{}{} has the highest mean IoU of known classes, {}", asked, _name(found.best), number(best.mean[HEADLINE])
     )
     if found.rival is None:
         alone = "no other row is asked the same" if several else "there is no other row to compare with"
@@ -120,6 +120,8 @@ def _evidence(runs: Sequence[Run], rows: Sequence[Row]) -> str:
     text += f"; {plural(failed, 'row')} failed" if failed else "; no row failed"
     if left := sum(row.is_left for run in runs for row in run.rows):
         text += f", {left} {'was' if left == 1 else 'were'} not run yet"
+    if skipped := sum(row.is_skipped for run in runs for row in run.rows):
+        text += f", {plural(skipped, 'row')} skipped for lack of a truth"
     return f"{text}.{_doubt(recordings, seeds)}"
 
 

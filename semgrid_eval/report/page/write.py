@@ -19,6 +19,8 @@ from semgrid_eval.report.estimates.paces import EDGES_MPS
 from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, SHARE_ENDS, class_style
 from semgrid_eval.report.examples.errors import FEWEST_WINDOWS, error_maps
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
+from semgrid_eval.report.examples.reel import make_reel
+from semgrid_eval.report.examples.stream_reel import stream_reel
 from semgrid_eval.report.page import exports, provenance
 from semgrid_eval.report.page.chart import draw_chart
 from semgrid_eval.report.page.chooser import chooser_axes
@@ -43,19 +45,19 @@ def write_report(
 
     Args:
         run: the folder of a run, or several.
-        out: the folder to write; `report` in the (first) run where it is not given. A report there is replaced in one
-            step, files in it that are not the report's stay, and others that write there at the same time wait.
+        out: the folder to write; `report` in the run where it is not given, but several runs need one. A report there
+            is replaced in one step, files in it that are not the report's stay, and others that write there at the same
+            time wait.
         resample: what is resampled first: recordings, or groups of them (towns, cities, drives).
         progress: told of each row read.
         damaged: told of each file of a run that is damaged, lost or another's, in one line; the page says it, too.
 
     Raises:
-        InputError: a run's record cannot be read, or `out` holds something other than a report.
+        InputError: a run's record cannot be read or is given twice, or `out` is missing or holds something other than
+            a report.
     """
     folders = [run] if isinstance(run, Path) else list(run)
-    if not folders:
-        raise InputError("no run is given", field="run")
-    out = folders[0] / "report" if out is None else out
+    out = _checked(folders, out)
     check_replaceable(out)
     material = gather(load_runs(folders, progress=progress), Resampling(SEED, level=resample))
     with locked(out.parent, f".{out.name}.lock"):
@@ -72,6 +74,18 @@ def write_report(
         for fault in each.damages:
             damaged(f"{fault.kind} {fault.name}: {fault.reason}")
     return out / PAGE
+
+
+def _checked(folders: Sequence[Path], out: Path | None) -> Path:
+    """Return the folder to write, after looking whether the runs are several and each is another one."""
+    if not folders:
+        raise InputError("no run is given", field="run")
+    for at, folder in enumerate(folders):
+        if folder.resolve() in {other.resolve() for other in folders[:at]}:
+            raise InputError("is given twice", path=folder, field="run")
+    if out is None and len(folders) > 1:
+        raise InputError("the report of several runs belongs to none of them: name a folder", field="out")
+    return folders[0] / "report" if out is None else out
 
 
 def render_page(material: Material) -> str:
@@ -94,7 +108,7 @@ def _frame(material: Material) -> dict[str, Any]:
     """Return what the page is made with, and what its parts share."""
     return {
         "style": Markup(class_style()) + _source("style.css") + _source("examples.css"),
-        "script": Markup().join(map(_source, ("page.js", "chooser.js", "examples.js", "colours.js"))),
+        "script": Markup().join(map(_source, ("page.js", "chooser.js", "examples.js", "reel.js", "colours.js"))),
         "version": __version__,
         "runs": material.runs,
         "title": title_of(material.runs),
@@ -116,9 +130,12 @@ def _verdict(material: Material, found: Headline | None) -> dict[str, Any]:
 def _pictures(material: Material, found: Headline | None) -> dict[str, Any]:
     """Return examples and maps of errors, of rows that are no streams, which keep no predictions."""
     rows = [entry.row for entry in material.scores.values() if not entry.row.is_stream]
-    examples = example_groups(material.runs, rows, None if found is None or found.best.is_stream else found)
+    shown = None if found is None or found.best.is_stream else found
+    examples = example_groups(material.runs, rows, shown)
     return {
         "examples": examples,
+        "reel": make_reel(material.scores, rows, shown),
+        "stream_reel": stream_reel(material.streams),
         "gaps": gaps(rows, examples),
         "widths": widths(rows),
         "legend": (*CLASS_LEGEND, MASK_LEGEND),

@@ -82,7 +82,12 @@ class Row:
     @property
     def is_left(self) -> bool:
         """Whether its turn has not come, or it was not asked for."""
-        return not self.results and not self.failures
+        return not (self.results or self.failures or self.is_skipped)
+
+    @property
+    def is_skipped(self) -> bool:
+        """Whether it asks for a truth that the logs do not hold."""
+        return self.record.skipped is not None
 
     @property
     def is_baseline(self) -> bool:
@@ -264,7 +269,7 @@ class _Loader:
             except (SemgridError, OSError, ValueError) as error:
                 faults.append(first_line(error))
         failures += faults
-        if not row.results and row.failure is None:
+        if not row.results and row.failure is None and row.skipped is None:
             failures.append("it has no result")
         if found and not any(result.record.windows for result in found):
             failures.append("it has no window to score")

@@ -1,18 +1,16 @@
 """What rows are, in words: what their models do, and what they are asked."""
 
-import re
 from collections.abc import Iterator, Sequence
 
 from semgrid_eval.report.rows.load import Row
 
-_INPUTS = re.compile(r", (?:moved to the target's time|not moved)\b")
-"""Where the part of a row's label begins that tells what is asked, behind what its model does."""
-
 
 def model_words(row: Row) -> str:
-    """Say what a row's model does: the beginning of its label, without its name."""
-    text = row.record.label.removeprefix(row.record.name).lstrip(" (:")
-    return _INPUTS.split(text, maxsplit=1)[0].removesuffix(")")
+    """Say what a row's model does, and where its grids are not moved as usual; runs of long ago tell its name alone."""
+    facts = row.record.facts
+    moved = "" if facts.translate else ", inputs not moved to the target's time"
+    carried = "" if facts.stream is None or facts.stream.moved else ", answers not moved along with the vehicle"
+    return f"{row.record.words or facts.model}{moved}{carried}"
 
 
 def question_words(row: Row, first: Row) -> str:

@@ -58,6 +58,7 @@ class Column:
     name: str
     label: str
     better: Better = "higher"
+    limits: tuple[float, float] = (0.0, 1.0)  # no value lies outside, so no interval does
 
 
 class Metric(Protocol):

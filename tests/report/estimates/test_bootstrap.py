@@ -8,6 +8,7 @@ from support.scoring import score_rows
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.estimates.bootstrap import (
     LABELS,
+    LEVEL,
     Estimate,
     Resampling,
     RowScores,
@@ -16,6 +17,7 @@ from semgrid_eval.report.estimates.bootstrap import (
     score_regions,
 )
 from semgrid_eval.report.estimates.division import EVERYWHERE, of_cells
+from semgrid_eval.report.estimates.student import stretch
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.rows.pairing import verdict
 from semgrid_eval.scores.metrics.iou import class_iou
@@ -185,10 +187,12 @@ def test_one_recording_gives_no_interval(tmp_path):
     assert verdict(entry.estimate("road")) == "open"
 
 
-def test_an_interval_is_the_middle_of_the_draws(run):
+def test_an_interval_is_the_middle_of_the_draws_longer_by_what_few_recordings_ask(run):
     row = load_runs([run])[0].rows[0]
-    draws = np.full((1001, len(LABELS)), np.nan)
-    draws[:, list(LABELS).index("road")] = np.linspace(0, 1, 1001)
-    entry = RowScores(row, IOU, row.results, np.full((1, len(LABELS)), 0.5), draws, np.zeros((1, 10, 10), np.int64), 1)
-    assert entry.estimate("road") == Estimate(0.5, pytest.approx(0.025), pytest.approx(0.975))
+    draws, size = np.full((1001, len(LABELS)), np.nan), len(LABELS)
+    draws[:, list(LABELS).index("road")] = np.linspace(0.4, 0.6, 1001)
+    sums, units = np.zeros((1, 10, 10), np.int64), np.full(size, 5)
+    entry = RowScores(row, IOU, row.results, np.full((1, size), 0.5), draws, sums, 1, units)
+    half = 0.095 * stretch(5, LEVEL)
+    assert entry.estimate("road") == Estimate(0.5, pytest.approx(0.5 - half), pytest.approx(0.5 + half))
     assert np.isnan(entry.estimate("car").low)

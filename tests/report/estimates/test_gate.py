@@ -84,6 +84,20 @@ def test_rows_are_chosen_by_name_by_pattern_or_as_pairs(runs):
         gate(runs, "good", "bad", rows=("ED-DD",))
 
 
+@pytest.mark.parametrize(
+    ("asked", "fault"),
+    [
+        ("ED-DC=ED-DC", r"renamed: row: 'ED-DC' is not one of BL-DC, ED-new"),
+        ("ED-DC=ED-nwe", r"renamed: row: 'ED-nwe' is not one of BL-DC, ED-new; did you mean ED-new\?"),
+        ("ED-D=ED-new", r"good: row: 'ED-D' is not one of BL-DC, ED-DC; did you mean ED-DC\?"),
+        ("ED=RN", r"good: row: 'ED' is not one of BL-DC, ED-DC"),
+    ],
+)
+def test_of_a_pair_the_name_that_is_wrong_is_said(runs, asked, fault):
+    with pytest.raises(InputError, match=fault):
+        gate(runs, "good", "renamed", rows=(asked,))
+
+
 def test_a_row_that_the_later_run_does_not_have_is_named(runs):
     found = gate(runs, "good", "renamed")
     assert found.missing == ("ED-DC",)
@@ -108,7 +122,9 @@ def test_rows_with_other_targets_are_refused_with_what_differs(runs):
 
 
 def test_what_no_limit_could_be_held_to_is_refused(runs):
-    with pytest.raises(InputError, match="row BL-DC has one recording: an interval needs more"):
+    with pytest.raises(
+        InputError, match="row BL-DC: one recording alone has cells of mean_known: an interval needs more"
+    ):
         gate(runs, "one", "one")
     rows = counted_row("one", {"car": [50, 50]}), counted_row("other", {"car": [40, 40]})
     with pytest.raises(InputError, match="row other has no cell of road"):

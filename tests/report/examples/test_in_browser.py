@@ -114,3 +114,57 @@ def test_colours_of_segmentation_and_grids_switch_together(browser, seen_page):
     browser.execute_script("document.querySelector('.colours').click()")
     after = browser.execute_script(script)
     assert [old != new for old, new in zip(before, after, strict=True)] == [True, True, False]
+
+
+PLACE = "getComputedStyle(reel.querySelector('img')).objectPosition"
+
+
+def _with_motion(browser, wanted):
+    features = [{"name": "prefers-reduced-motion", "value": wanted}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+
+def test_the_grid_of_examples_stands_still_for_who_wants_no_motion_and_steps_by_hand(browser, reference_page):
+    _with_motion(browser, "reduce")
+    open_page(browser, reference_page, width=1280)
+    script = f"""
+    const done = arguments[0], reel = document.querySelector('.reel'), slider = reel.querySelector('input');
+    reel.scrollIntoView();
+    const [said, button] = ['output', 'button'].map(kind => reel.querySelector(kind));
+    const state = () => [slider.value, said.value, button.textContent, {PLACE}];
+    setTimeout(() => {{
+      const seen = [state()];
+      for (let at = 0; at <= slider.max; at++) {{
+        slider.value = at;
+        slider.dispatchEvent(new Event('input'));
+        seen.push(state());
+      }}
+      done(seen);
+    }}, 600);
+    """
+    before, *steps = browser.execute_async_script(script)
+    assert before == steps[-1] == ["3", "0.29 s ahead", "Play", "100% 0px"]
+    assert [step[1] for step in steps] == ["1.18 s ahead", "0.88 s ahead", "0.59 s ahead", "0.29 s ahead"]
+    assert [float(step[3].split("%")[0]) for step in steps] == pytest.approx([0, 100 / 3, 200 / 3, 100], abs=0.01)
+
+
+def test_the_grid_of_examples_plays_once_when_it_is_seen_and_again_when_asked(browser, reference_page):
+    _with_motion(browser, "no-preference")
+    open_page(browser, reference_page, width=1280)
+    script = """
+    const done = arguments[0], reel = document.querySelector('.reel'), button = reel.querySelector('button');
+    const seen = [], until = (word, then) => {
+      const look = setInterval(() => { if (button.textContent === word) { clearInterval(look); then(); } }, 20);
+    };
+    reel.scrollIntoView();
+    until('Stop', () => until('Play', () => {
+      seen.push(reel.querySelector('input').value);
+      button.click();
+      seen.push(button.textContent, reel.querySelector('input').value);
+      button.click();
+      seen.push(button.textContent);
+      done(seen);
+    }));
+    """
+    assert browser.execute_async_script(script) == ["3", "Stop", "0", "Play"]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})

@@ -4,7 +4,15 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from semgrid_eval.report.page.provenance import command_table, data_sets, duration, log_table, matrix_file, matrix_text
+from semgrid_eval.report.page.provenance import (
+    command_table,
+    data_sets,
+    duration,
+    failures,
+    log_table,
+    matrix_file,
+    matrix_text,
+)
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.scores.results import read_run
@@ -89,3 +97,20 @@ def test_logs_without_checksums_are_told(run):
     (found,) = load_runs([run])
     found = replace(found, record=with_logs(run, (logs[0].model_copy(update={"checksums": False}), *logs[1:])))
     assert [body[0].cells[-1].text for body in log_table([found]).bodies] == ["none", *["yes"] * 7]
+
+
+def test_recovered_logs_and_skipped_rows_are_named_beside_failures(run):
+    record = read_run(run)
+    first, *others = record.logs
+    record = record.model_copy(
+        update={"logs": (first.model_copy(update={"recovered": "was recovered, 3 messages are lost"}), *others)}
+    )
+    (found,) = load_runs([run])
+    lacking = found.rows[0].record.model_copy(update={"results": (), "skipped": "holds no exact pictures"})
+    rows = (replace(found.rows[0], record=lacking, results=(), failures=()), *found.rows[1:])
+    found = replace(found, record=record, rows=rows)
+    told = {(each.kind, each.name): each.reason for each in failures([found])}
+    assert told["log", first.path] == "was recovered, 3 messages are lost"
+    assert told["skipped row", "BL-DC"] == "holds no exact pictures"
+    assert command_table([found]).bodies[0][0].cells[1].text == "skipped"
+    assert not found.rows[0].is_left

@@ -1,30 +1,31 @@
 from dataclasses import replace
 
-import pytest
 from support.fake_run import counted_row
 
 from semgrid_eval.report.rows.words import model_words, otherwise_asked, question_words, same_rows
+from semgrid_eval.scores.facts import StreamFacts
 
 
-def _row(name="ED-DC", label="", **facts):
+def _row(name="ED-DC", words="", **facts):
     row = counted_row(name, {"car": [50, 60]})
     changed = row.record.facts.model_copy(update=facts)
-    record = row.record.model_copy(update={"facts": changed, "label": label or row.record.label, "results": (name,)})
+    record = row.record.model_copy(update={"facts": changed, "words": words, "results": (name,)})
     return replace(row, record=record)
 
 
-@pytest.mark.parametrize(
-    ("label", "words"),
-    [
-        ("ED-DC (encoder-decoder d 3, f 32, moved to the target's time, 2 inputs)", "encoder-decoder d 3, f 32"),
-        ("ED-DC (exact world, 15 draws, not moved, 2 inputs)", "exact world, 15 draws"),
-        ("ED-DC (answers made elsewhere)", "answers made elsewhere"),
-        ("ED-DC: network", "network"),
-        ("ED-DC", ""),
-    ],
-)
-def test_what_a_model_does_is_the_part_of_the_label_before_its_inputs(label, words):
-    assert model_words(_row(label=label)) == words
+def test_models_are_told_apart_by_what_they_do_and_by_whether_their_grids_are_moved():
+    assert model_words(_row(words="encoder-decoder d 3, f 32")) == "encoder-decoder d 3, f 32"
+    still = _row(words="newest input", translate=False)
+    assert model_words(still) == "newest input, inputs not moved to the target's time"
+    stream = StreamFacts(words="", added_ms=0, measured=True, moved=False, asked="capture", model_is_free=False)
+    assert (
+        model_words(_row(words="newest input", stream=stream))
+        == "newest input, answers not moved along with the vehicle"
+    )
+
+
+def test_a_run_of_long_ago_tells_the_names_of_its_models_alone():
+    assert model_words(_row()) == "ed"
 
 
 def test_a_question_is_said_whole_once_and_then_as_far_as_it_differs():

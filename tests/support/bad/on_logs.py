@@ -11,8 +11,6 @@ model: newest, window: {step_frames: 3, target_frame: 8, lead_ms: 400}
 model: newest, validation_split: test
 model: ed, train_split: test
 model: newest, hold_out: [town03]
-model: true_motion
-model: fresh
 model: residual-town, window: {step_frames: 3, target_frame: null, lead_ms: 1300}
 model: newest, window: {inputs: 12, step_frames: 1, target_frame: null}, stream: {latency_ms: 50}
 """

@@ -15,6 +15,7 @@ from semgrid_eval.scores import results
 from semgrid_eval.seals import write_sealed_json
 
 PLAY, REPORT = "play run BL --out play.mcap", "report run"
+GATE = "report run other --out page --fail-below 'road: -0.01' --row BL=LB"
 LIVE = "play run live --stream --out play.mcap"
 ROWS = [
     {"name": "BL", "model": "newest"},
@@ -124,6 +125,13 @@ KIND = Kind(
         _bad("`report`: --out is a file", f"{REPORT} --out base.yaml"),
         _bad("`report`: --out is a folder of something else", f"{REPORT} --out page", _foreign_report),
         _bad("`report`: --out is the run itself", f"{REPORT} --out run"),
+        _bad("`report`: several runs without --out", "report run other"),
+        _bad("`report`: the same run twice", "report run logs/../run --out page"),
+        _bad(
+            "`report`: a gate of a row that the later run calls otherwise",
+            GATE,
+            lambda: shutil.copytree("run", "other"),
+        ),
         _bad("`report`: a result is damaged", REPORT, lambda: _flip(_result() / "sums.npz")),
         _bad("`play`: no such folder", "play nowhere BL --out play.mcap"),
         _bad("`play`: no such row", "play run BI --out play.mcap"),
