@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from semgrid_eval.api import score as score
     from semgrid_eval.api import write_report as write_report
     from semgrid_eval.classes import CLASS_NAMES as CLASS_NAMES
-    from semgrid_eval.classes import CLASSES as CLASSES
+    from semgrid_eval.classes import DEFAULT_CLASSES as DEFAULT_CLASSES
+    from semgrid_eval.classes import ClassSet as ClassSet
+    from semgrid_eval.classes import load_classes as load_classes
     from semgrid_eval.config import Config as Config
     from semgrid_eval.errors import SemgridError as SemgridError
     from semgrid_eval.grids.recording import GridRecording as GridRecording
@@ -46,7 +48,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "api": "build_grids convert find_logs fit load_run make_model make_windows open_log plot_grid "
     "run score write_report",
-    "classes": "CLASSES CLASS_NAMES",
+    "classes": "CLASS_NAMES ClassSet DEFAULT_CLASSES load_classes",
     "config": "Config",
     "errors": "SemgridError",
     "grids.recording": "GridRecording",

@@ -94,7 +94,7 @@ class RunData:
                 found = ", ".join(sorted({record.split for record in self.records.values()})) or "none"
                 raise InputError(f"no recording of split {split!r} gave grids (splits found: {found})")
             sensors = list(dict.fromkeys(self._sensors[key[0]]))
-            stacked = stack_recordings(chosen, cell_m=config.spec.cell_m, sensors=sensors)
+            stacked = stack_recordings(chosen, cell_m=config.spec.cell_m, classes=config.classes, sensors=sensors)
             self._stacked[key] = stacked.to(self._device)
             # They have their copy now.
             data_set.recordings = [recording for recording in data_set.recordings if recording.split != split]

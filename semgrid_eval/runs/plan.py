@@ -2,7 +2,7 @@
 
 import tempfile
 from collections import defaultdict
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -109,7 +109,9 @@ class _Speed:
         """Estimate the rest of a training with its validation after each epoch."""
         sample = settings.model_copy(update={"training": settings.training.model_copy(update=SAMPLE)})
         resolved = job.resolved
-        build = digest_value([job.row.model, resolved.version, sample.model_dump(mode="json"), asdict(job.row.given)])
+        build = digest_value(
+            [job.row.model, resolved.version, sample.model_dump(mode="json"), job.row.given.described()]
+        )
         if build not in self._seconds:
             self._seconds[build] = self._measure(job, sample)
         config, watched = settings.training, job.training and job.training.watched

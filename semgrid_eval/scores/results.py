@@ -25,7 +25,7 @@ RUN/pictures/<key>.npz         small camera and label images of the windows' fra
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,10 +35,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from semgrid_eval.arrays import read_arrays, write_arrays
+from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError, ResultError, first_line
 from semgrid_eval.scores.facts import RowFacts, StreamRecord
-from semgrid_eval.scores.metrics.table import METRICS, Sums
+from semgrid_eval.scores.metrics.metric import Metric
+from semgrid_eval.scores.metrics.table import Sums, metrics_of
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.seals import read_sealed, read_sealed_json, write_sealed_json
 
@@ -107,6 +109,17 @@ class ResultRecord(Config):
     parameters: int | None
     stream: StreamRecord | None = None  # then its windows are blocks of time, and the first recording is kept
     has_expected: bool = False  # whether it is also scored against what is measured on average
+
+    @property
+    def classes(self) -> ClassSet:
+        """The classes of its grids, as its configuration has them.
+
+        Raises:
+            ConfigError: that is not a class set.
+        """
+        grid = self.config.get("grid")
+        named = grid.get("classes") if isinstance(grid, dict) else None
+        return DEFAULT_CLASSES if named is None else parse_config(ClassSet, named, path=f"{self.id}: grid.classes")
 
 
 class RowRecord(Config):
@@ -186,7 +199,7 @@ def fault_of(folder: Path, *, with_predictions: bool = False, with_history: bool
     """Say why a result is not done; None where it parses, matches its id and has sums and what else is asked for."""
     try:
         record = read_result(folder)
-        check_sums(folder, len(record.windows), has_expected=record.has_expected)
+        check_sums(folder, len(record.windows), record.classes, has_expected=record.has_expected)
         if with_predictions:
             read_stream(folder) if record.stream else read_predictions(folder)
         if with_history and ((history := read_history(folder)) is None or history.empty):
@@ -243,19 +256,27 @@ def write_sums(folder: Path, sums: Sums, result_id: str = "", file: str = SUMS_F
 
 
 def read_sums(
-    folder: Path, metric: str, partition: str, *, file: str = SUMS_FILE, verify: bool = True
+    folder: Path,
+    metric: str,
+    partition: str,
+    classes: ClassSet = DEFAULT_CLASSES,
+    *,
+    file: str = SUMS_FILE,
+    verify: bool = True,
 ) -> NDArray[np.int32] | None:
     """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions.
 
-    Who has called `check_sums` before need not `verify` the file each time.
+    `classes` are the result's. Who has called `check_sums` before need not `verify` the file each time.
     """
-    return _read_sums(folder / file, [(metric, partition)], verify=verify).get((metric, partition))
+    key = (metric, partition)
+    return _read_sums(folder / file, [key], metrics_of(classes), verify=verify).get(key)
 
 
-def check_sums(folder: Path, windows: int, *, has_expected: bool = False) -> None:
+def check_sums(folder: Path, windows: int, classes: ClassSet = DEFAULT_CLASSES, *, has_expected: bool = False) -> None:
     """Read everything that was counted, and forget it; a ResultError says what is missing or malformed."""
+    metrics = metrics_of(classes)
     for file in (SUMS_FILE, EXPECTED_FILE) if has_expected else (SUMS_FILE,):
-        for key, found in _read_sums(folder / file, list(product(METRICS, PARTITIONS))).items():
+        for key, found in _read_sums(folder / file, list(product(metrics, PARTITIONS)), metrics).items():
             if len(found) != windows:
                 fault = f"has {len(found)} windows, and result.json {windows}"
                 raise ResultError(fault, path=folder / file, field=".".join(key))
@@ -267,7 +288,7 @@ def _owner_of_sums(result_id: str, file: str) -> str:
 
 
 def _read_sums(
-    path: Path, keys: Sequence[tuple[str, str]], *, verify: bool = True
+    path: Path, keys: Sequence[tuple[str, str]], metrics: Mapping[str, Metric], *, verify: bool = True
 ) -> dict[tuple[str, str], NDArray[np.int32]]:
     names = {key: ".".join(key) for key in keys}
     needed = tuple(name for key, name in names.items() if key[1] == "all")
@@ -276,7 +297,7 @@ def _read_sums(
     found = read_arrays(path, needed, owner=owner, optional=optional, verify=verify)
     sums = {key: found[name] for key, name in names.items() if name in found}
     for (metric, partition), counted in sums.items():
-        shape = (len(PARTITIONS[partition].regions), *METRICS[metric].shape)
+        shape = (len(PARTITIONS[partition].regions), *metrics[metric].shape)
         if counted.shape[1:] != shape or counted.dtype != np.int32 or counted.min(initial=0) < 0:
             fault = f"has shape {counted.shape}, type {counted.dtype}, or is negative"
             raise ResultError(fault, path=path, field=names[metric, partition])

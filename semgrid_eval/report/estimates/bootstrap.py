@@ -13,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division, RowSums, row_sums
-from semgrid_eval.report.rows.load import Result, Row, comparable
+from semgrid_eval.report.rows.load import Result, Row, classes_of, comparable
+from semgrid_eval.scores.metrics.iou import Iou
 from semgrid_eval.scores.metrics.metric import Counts, Floats, Metric, column_names, divided, mean_finite
-from semgrid_eval.scores.metrics.table import IOU, METRICS
+from semgrid_eval.scores.metrics.table import IOU, metrics_of
 
 LEVEL = 0.95
-LABELS = {column.name: column.label for column in IOU.columns}
-"""Every figure of IoU in words: the classes, the categories, and the categories with their classes merged."""
-
 Level = Literal["recordings", "groups"]
 
 DRAWS = 1000
@@ -174,11 +172,20 @@ def interval_of(value: float, draws: Floats) -> Estimate:
 
 
 def score_all(rows: Sequence[Row], divisions: Sequence[Division], resampling: Resampling) -> Everything:
-    """Score rows by every metric in all regions of the divisions."""
+    """Score rows by every metric in all regions of the divisions.
+
+    Raises:
+        InputError: rows have different classes.
+    """
     return {
         metric.name: {each.name: score_regions(rows, metric, each, resampling) for each in divisions}
-        for metric in METRICS.values()
+        for metric in metrics_of(classes_of(rows)).values()
     }
+
+
+def shared_iou(entries: Iterable[RowScores]) -> Iou:
+    """Return the IoU that rows are scored by; it says which figures there are for their classes."""
+    return next((entry.metric for entry in entries if isinstance(entry.metric, Iou)), IOU)
 
 
 def everywhere(everything: Everything, metric: str) -> Scores:

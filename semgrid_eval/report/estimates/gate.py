@@ -9,11 +9,11 @@ from pathlib import Path
 from semgrid_eval.errors import InputError
 from semgrid_eval.faults import meant, not_one_of
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.report.estimates.bootstrap import LABELS, SEED, Estimate, Level, Resampling, Scores, score_regions
+from semgrid_eval.report.estimates.bootstrap import SEED, Estimate, Level, Resampling, Scores, score_regions
 from semgrid_eval.report.estimates.division import EVERYWHERE
-from semgrid_eval.report.rows.load import Row, Run, comparable, load_runs
+from semgrid_eval.report.rows.load import Row, Run, classes_of, comparable, load_runs
 from semgrid_eval.report.rows.pairing import changed_targets, settings_of
-from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores.metrics.table import iou_of
 
 OPTION = "fail-below"
 
@@ -49,7 +49,7 @@ def parse_limit(text: str) -> Limit:
     """Read a limit, `COLUMN: DIFFERENCE`, such as `vehicles: -0.01`.
 
     Raises:
-        InputError: it is written otherwise, there is no such column, or the difference is not one that may be lost.
+        InputError: it is written otherwise, or the difference is not one that may be lost.
     """
     column, sign, number = (part.strip() for part in text.rpartition(":"))
     try:
@@ -58,8 +58,6 @@ def parse_limit(text: str) -> Limit:
         least = nan
     if not isfinite(least):
         raise InputError(f"{text!r} is not of the form 'vehicles: -0.01'", field=OPTION)
-    if column not in LABELS:
-        raise InputError(not_one_of(column, LABELS), field=OPTION)
     if not -1.0 <= least <= 0.0:
         raise InputError(f"{text!r}: what may be lost of an IoU is a number from -1 to 0", field=OPTION)
     return Limit(column, least)
@@ -111,7 +109,11 @@ def hold(pairs: Sequence[tuple[Row, Row]], limits: Sequence[Limit], resampling: 
     for one, other in pairs:
         _require_comparable(one, other)
     both = [row for pair in pairs for row in pair]
-    scores = score_regions(both, IOU, EVERYWHERE, resampling).get("all", {})
+    iou = iou_of(classes_of(both))
+    for limit in limits:
+        if limit.column not in iou.labels:
+            raise InputError(not_one_of(limit.column, iou.labels), field=OPTION)
+    scores = score_regions(both, iou, EVERYWHERE, resampling).get("all", {})
     return tuple(_verdict(scores, pair, limit) for pair in pairs for limit in limits)
 
 

@@ -21,14 +21,14 @@ from semgrid_eval.report.estimates.way import against_expected, order_of
 from semgrid_eval.report.figures import categories, curves, settings
 from semgrid_eval.report.figures.streams import stream_plots
 from semgrid_eval.report.figures.style import Plot
-from semgrid_eval.report.rows.load import Row, Run
+from semgrid_eval.report.rows.load import Row, Run, classes_of
 from semgrid_eval.report.rows.pairing import main_group
 from semgrid_eval.report.rows.words import same_rows
 from semgrid_eval.report.tables.scores import division_tables, score_tables
 from semgrid_eval.report.tables.streams import lead_table, stream_table, wins_table
 from semgrid_eval.report.tables.table import Table
 from semgrid_eval.report.tables.truth import expected_table, order_sentence, way_table
-from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores.metrics.table import iou_of
 from semgrid_eval.scores.regions.table import PARTITIONS
 
 
@@ -119,4 +119,5 @@ def without(everything: Everything, hidden: Container[str]) -> Everything:
 def score_expected(rows: Sequence[Row], resampling: Resampling) -> Everything:
     """Score rows against what is measured on average, of all cells and near actors."""
     parts = [of_cells(PARTITIONS[name]) for name in ("all", "actors")]
-    return {"iou": {part.name: score_regions(against_expected(rows), IOU, part, resampling) for part in parts}}
+    iou = iou_of(classes_of(rows))
+    return {"iou": {part.name: score_regions(against_expected(rows), iou, part, resampling) for part in parts}}
