@@ -186,18 +186,18 @@ class ClassSet(Config):
 
     @property
     def averaged(self) -> Mapping[str, tuple[int, ...]]:
-        """Ids of the classes behind the figures of each category: with and, where that is in it, without `unknown`."""
+        """Ids of the classes behind each mean: those of categories, also without `unknown` where it is in one, and all."""
         found: dict[str, tuple[int, ...]] = {}
         for name in self.category_names:
             found[name] = self.members(name)
             if UNKNOWN in found[name]:
                 found[known_name(name)] = found[name][1:]
-        return found
+        return {**found, MEAN_KNOWN: self.known}
 
     @property
     def figures(self) -> tuple[str, ...]:
-        """Names of classes, of categories and of the means over known classes."""
-        return (*self.names, *self.averaged, MEAN_KNOWN)
+        """Names of classes and of means."""
+        return (*self.names, *self.averaged)
 
     def kernels_cells(self, class_id: int) -> tuple[int, int, int, int]:
         """Return the sides of the kernels by which a known class is filtered."""

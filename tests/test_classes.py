@@ -1,19 +1,16 @@
 from semgrid_eval.classes import (
     CITYSCAPES_LABELS,
     CLASS_NAMES,
-    KNOWN_IDS,
+    DEFAULT_CLASSES,
     NO_POINT,
     UNKNOWN,
-    category_members,
-    class_map,
     label_ids_from_train_ids,
-    priorities,
 )
 
 
 def grid_class(label_name):
     label = next(label for label in CITYSCAPES_LABELS if label.name == label_name)
-    value = class_map()[label.label_id]
+    value = DEFAULT_CLASSES.class_by_label()[label.label_id]
     return None if value == NO_POINT else CLASS_NAMES[value]
 
 
@@ -36,8 +33,8 @@ def test_class_map_follows_reading_21():
 
 
 def test_ids_that_cityscapes_does_not_know_give_no_point():
-    assert set(class_map()[34:]) == {NO_POINT}
-    assert UNKNOWN not in class_map()
+    assert set(DEFAULT_CLASSES.class_by_label()[34:]) == {NO_POINT}
+    assert UNKNOWN not in DEFAULT_CLASSES.class_by_label()
 
 
 def test_train_ids_are_the_nineteen_of_cityscapes_in_order():
@@ -52,15 +49,15 @@ def test_train_ids_are_the_nineteen_of_cityscapes_in_order():
 
 
 def test_priority_ascends_static_small_static_vehicles_small_dynamic():
-    value = dict(zip(CLASS_NAMES, priorities(), strict=True))
+    value = dict(zip(CLASS_NAMES, DEFAULT_CLASSES.priorities(), strict=True))
     assert value["unknown"] < value["road"] == value["building"] < value["pole_sign"]
     assert value["pole_sign"] < value["car"] == value["large_vehicle"] < value["person"] == value["bicycle"]
 
 
 def test_every_class_is_in_one_category():
-    members = [class_id for classes in category_members().values() for class_id in classes]
+    members = [i for name in DEFAULT_CLASSES.category_names for i in DEFAULT_CLASSES.members(name)]
     assert sorted(members) == list(range(len(CLASS_NAMES)))
 
 
 def test_known_classes_are_all_but_unknown():
-    assert [CLASS_NAMES[i] for i in KNOWN_IDS] == [name for name in CLASS_NAMES if name != "unknown"]
+    assert [CLASS_NAMES[i] for i in DEFAULT_CLASSES.known] == [name for name in CLASS_NAMES if name != "unknown"]

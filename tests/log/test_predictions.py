@@ -5,9 +5,9 @@ import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.writer import Writer
 
-from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES
 from semgrid_eval.errors import InputError, LogError
-from semgrid_eval.log.grids import CLASSES, GridPlace, exact_message
+from semgrid_eval.log.grids import GridPlace, class_layer, exact_message
 from semgrid_eval.log.predictions import (
     RECORD,
     TOPIC,
@@ -19,7 +19,8 @@ from semgrid_eval.log.predictions import (
 )
 from semgrid_eval.log.writer import MessageWriter
 
-EXTENT = GridExtent(4, 3, GridPlace(0.5, 2.0, 0.5))
+EXTENT = GridExtent(4, 3, GridPlace(0.5, 2.0, 0.5), DEFAULT_CLASSES)
+CLASSES = class_layer(DEFAULT_CLASSES)
 MS = 1_000_000
 
 
@@ -60,7 +61,7 @@ def test_what_is_written_comes_back(tmp_path):
 
 
 def test_a_log_without_a_record_belongs_to_the_recording_of_its_name(tmp_path):
-    path = write(tmp_path / "drive_7#2.mcap", [(2 * 10**18, prediction_message(prediction(), EXTENT.place))])
+    path = write(tmp_path / "drive_7#2.mcap", [(2 * 10**18, prediction_message(prediction(), CLASSES, EXTENT.place))])
     with PredictionLog(path) as log:
         assert log.recording == "drive_7#2"
 
@@ -71,8 +72,8 @@ def test_of_several_topics_the_one_of_predictions_is_taken_or_one_is_named(tmp_p
     with path.open("wb") as stream, MessageWriter(stream) as writer:
         for topic, message in (
             ("/grid/target/exact", target),
-            ("/grid/prediction/a/exact", prediction_message(prediction(1), EXTENT.place)),
-            ("/node/out", prediction_message(prediction(2), EXTENT.place)),
+            ("/grid/prediction/a/exact", prediction_message(prediction(1), CLASSES, EXTENT.place)),
+            ("/node/out", prediction_message(prediction(2), CLASSES, EXTENT.place)),
         ):
             writer.write(topic, message, log_ns=at_ns)
     assert read(path)[0].capture_ns == prediction(1).capture_ns
@@ -84,7 +85,7 @@ def test_of_several_topics_the_one_of_predictions_is_taken_or_one_is_named(tmp_p
 def test_several_topics_of_predictions_are_ambiguous(tmp_path):
     with (tmp_path / "a.mcap").open("wb") as stream, MessageWriter(stream) as writer:
         for topic in ("/a", "/b"):
-            writer.write(topic, prediction_message(prediction(), EXTENT.place), log_ns=2 * 10**18)
+            writer.write(topic, prediction_message(prediction(), CLASSES, EXTENT.place), log_ns=2 * 10**18)
     with pytest.raises(LogError, match=r"topic: holds semgrid.v1.SemanticGrid as /a, /b: name one"):
         read(tmp_path / "a.mcap")
 
@@ -126,7 +127,7 @@ FAULTS = {
 @pytest.mark.parametrize("kind", FAULTS)
 def test_what_is_no_prediction_of_these_grids_is_refused(tmp_path, kind):
     change, fault = FAULTS[kind]
-    message, at_ns = prediction_message(prediction(), EXTENT.place), prediction().publish_ns
+    message, at_ns = prediction_message(prediction(), CLASSES, EXTENT.place), prediction().publish_ns
     change(message)
     with pytest.raises(LogError) as refused:
         read(write(tmp_path / "a.mcap", [(at_ns, message)], "/node/out"))
@@ -135,7 +136,7 @@ def test_what_is_no_prediction_of_these_grids_is_refused(tmp_path, kind):
 
 def test_publication_that_goes_back_in_the_log_is_refused_and_captures_may(tmp_path):
     first_ns = prediction(2).publish_ns
-    older, newer = (prediction_message(prediction(number), EXTENT.place) for number in (1, 2))
+    older, newer = (prediction_message(prediction(number), CLASSES, EXTENT.place) for number in (1, 2))
     path = write(tmp_path / "a.mcap", [(first_ns, newer), (first_ns, older)])
     assert [each.capture_ns for each in read(path)] == [prediction(2).capture_ns, prediction(1).capture_ns]
     path = write(tmp_path / "b.mcap", [(first_ns, newer), (first_ns - 1, older, first_ns + 1)])
@@ -147,7 +148,7 @@ def test_publication_that_goes_back_in_the_log_is_refused_and_captures_may(tmp_p
 
 @pytest.mark.parametrize("record", [{}, {"recording": ""}])
 def test_a_record_that_names_no_recording_is_refused(tmp_path, record):
-    path = write(tmp_path / "a.mcap", [(1, prediction_message(prediction(), EXTENT.place))], record=record)
+    path = write(tmp_path / "a.mcap", [(1, prediction_message(prediction(), CLASSES, EXTENT.place))], record=record)
     with pytest.raises(LogError, match=r"metadata semgrid.predictions: recording: names no recording"):
         PredictionLog(path)
 
@@ -163,7 +164,7 @@ def test_a_log_without_grids_and_a_message_that_is_none_are_refused(tmp_path):
 
 @pytest.mark.parametrize("cut", [1, 7, 40])
 def test_a_message_that_is_cut_is_damage(tmp_path, cut):
-    data = prediction_message(prediction(), EXTENT.place).SerializeToString()
+    data = prediction_message(prediction(), CLASSES, EXTENT.place).SerializeToString()
     writer = Writer(str(tmp_path / "a.mcap"))
     writer.start()
     schema = writer.register_schema("semgrid.v1.SemanticGrid", "protobuf", b"")

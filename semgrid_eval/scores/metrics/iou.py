@@ -33,15 +33,15 @@ class Iou(Metric):
     def __init__(self, classes: ClassSet) -> None:
         self.classes = classes
         self.shape = (classes.count, classes.count)
-        averaged = classes.averaged
-        self._averaged = {**averaged, MEAN_KNOWN: classes.known}
+        self._averaged, merged = classes.averaged, {**classes.averaged}
+        del merged[MEAN_KNOWN]
         self.category_columns = tuple(self._averaged)
-        self.merged_columns = tuple(f"merged_{name}" for name in averaged)
+        self.merged_columns = tuple(f"merged_{name}" for name in merged)
         self.ratio_names = (*classes.names, *self.merged_columns)
         words, names = self._words(), (*classes.names, *self.category_columns, *self.merged_columns)
         self.columns = tuple(Column(name, words[name]) for name in names)
         self.labels = {column.name: column.label for column in self.columns}
-        self._groups = [(i,) for i in range(classes.count)] + list(averaged.values())  # behind each ratio
+        self._groups = [(i,) for i in range(classes.count)] + list(merged.values())  # behind each ratio
 
     def _words(self) -> Mapping[str, str]:
         """Return what figures are called in words, by their names."""
@@ -103,10 +103,9 @@ class Iou(Metric):
     @cached_property
     def _membership(self) -> NDArray[np.int64]:
         """Which classes stand behind each figure: (Q, C)."""
-        table = self._averaged | {f"merged_{name}": ids for name, ids in self.classes.averaged.items()}
-        table |= {name: (i,) for i, name in enumerate(self.classes.names)}
-        count = self.classes.count
-        return np.array([[i in table[column.name] for i in range(count)] for column in self.columns], np.int64)
+        table = {**self._averaged, **{name: (i,) for i, name in enumerate(self.classes.names)}}
+        behind = [table[name.removeprefix("merged_")] for name in self.labels]
+        return np.array([[i in ids for i in range(self.classes.count)] for ids in behind], np.int64)
 
 
 def confusion(

@@ -29,7 +29,7 @@ def test_a_share_of_the_cells_is_changed(share):
 
 
 def test_patches_are_squares_of_one_change_on_a_lattice():
-    steps = patches(np.random.default_rng(3), 0.5, 3, (13, 10))
+    steps = patches(np.random.default_rng(3), 0.5, 3, (13, 10), 9)
     assert steps.shape == (13, 10)
     edges = [np.flatnonzero(np.diff(steps.astype(int), axis=axis).any(axis=1 - axis)) + 1 for axis in (0, 1)]
     for found in edges:
