@@ -118,8 +118,7 @@ class ClassSet(Config):
     def _sound(self) -> Self:
         if self.names[0] != _UNKNOWN_NAME:
             raise ValueError(f"classes.0.name: {self.names[0]!r} is not {_UNKNOWN_NAME}, which has to be the first")
-        if repeated := _repeated((*self.figures, *(f"merged_{name}" for name in self.averaged))):
-            raise ValueError(f"{repeated!r} is the name of two classes, categories or figures, among them {_DERIVED}")
+        self._check_names()
         for number, entry in enumerate(self.classes):
             self._check(f"classes.{number}", entry)
         for number, name in enumerate(self.category_names):
@@ -130,6 +129,18 @@ class ClassSet(Config):
             names = [entry.name for entry, ids in zip(self.classes, label_ids, strict=True) if twice in ids]
             raise ValueError(f"classes: the label {_label_words(twice)} is mapped twice, to {' and '.join(names)}")
         return self
+
+    def _check_names(self) -> None:
+        """Refuse names that would stand for two columns of a table."""
+        known = known_name(self.classes[UNKNOWN].category or "")
+        figures = (MEAN_KNOWN, known, *(f"merged_{name}" for name in (*self.category_names, known)))
+        owners = dict.fromkeys(figures, "figure")
+        for kind, names in (("category", self.category_names), ("class", self.names)):
+            for number, name in enumerate(names):
+                if name in owners:
+                    place = f"{_LISTS[kind]}.{number}.name"
+                    raise ValueError(f"{place}: {name!r} is the name of a {owners[name]} already")
+                owners[name] = kind
 
     def _check(self, place: str, entry: GridClass) -> None:
         is_unknown = entry.name == _UNKNOWN_NAME
@@ -186,18 +197,13 @@ class ClassSet(Config):
 
     @property
     def averaged(self) -> Mapping[str, tuple[int, ...]]:
-        """Ids of the classes behind each mean: those of categories, also without `unknown` where it is in one, and all."""
+        """Ids of the classes behind each mean: of categories, also without `unknown` where it is in one, and of all."""
         found: dict[str, tuple[int, ...]] = {}
         for name in self.category_names:
             found[name] = self.members(name)
             if UNKNOWN in found[name]:
                 found[known_name(name)] = found[name][1:]
         return {**found, MEAN_KNOWN: self.known}
-
-    @property
-    def figures(self) -> tuple[str, ...]:
-        """Names of classes and of means."""
-        return (*self.names, *self.averaged)
 
     def kernels_cells(self, class_id: int) -> tuple[int, int, int, int]:
         """Return the sides of the kernels by which a known class is filtered."""
@@ -223,7 +229,7 @@ class ClassSet(Config):
 
 MEAN_KNOWN = "mean_known"
 """The figure that is the mean over all known classes."""
-_DERIVED = f"{MEAN_KNOWN}, merged_... and, of the category of {_UNKNOWN_NAME}, ..._known"
+_LISTS = {"category": "categories", "class": "classes"}
 
 
 def known_name(category: str) -> str:

@@ -108,7 +108,7 @@ def test_morphology_and_priorities_match_a_slow_twin(seed, density):
     rng = np.random.default_rng(seed)
     counts = rng.integers(1, 4, (CLASS_COUNT, 14, 14)) * (rng.random((CLASS_COUNT, 14, 14)) < density)
     counts = counts.astype(np.int32)
-    np.testing.assert_array_equal(rasterise(counts, DEFAULT_CLASSES), slow_rasterise(counts, DEFAULT_CLASSES))
+    np.testing.assert_array_equal(rasterise(counts, DEFAULT_CLASSES), slow_rasterise(counts))
 
 
 def test_small_and_dynamic_classes_win_over_many_points_of_static_ones():

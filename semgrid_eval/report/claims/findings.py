@@ -17,6 +17,10 @@ from semgrid_eval.scores.metrics.table import IOU
 
 TRUTH = "logs that tell where true actors move"
 SAME_TARGETS = "rows with the same targets"
+FINDING_COLUMNS = (
+    *("run", "name", "claim", "verdict", "comparison", "score", "region", "rule", "margin", "comparison_verdict"),
+    *("difference", "low", "high", "windows", "missing"),
+)
 
 
 class Verdict(StrEnum):
@@ -123,7 +127,8 @@ def missing_table(name: str, findings: Sequence[Finding]) -> Table:
 
 def finding_frame(findings: Sequence[Finding]) -> pd.DataFrame:
     """Return one line for each comparison, with the verdict of its claim beside its own."""
-    return pd.DataFrame([_head(each) | part for each in findings for part in map(_values, each.outcomes)])
+    lines = [_head(each) | part for each in findings for part in map(_values, each.outcomes)]
+    return pd.DataFrame(lines, columns=list(FINDING_COLUMNS))
 
 
 def finding_records(findings: Sequence[Finding]) -> list[dict[str, Any]]:

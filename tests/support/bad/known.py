@@ -2,6 +2,7 @@
 
 from support.bad import (
     cityscapes,
+    class_sets,
     commands,
     containers,
     contracts,
@@ -18,7 +19,7 @@ from support.bad import (
 )
 
 KINDS = (
-    *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, matrices.STREAM, on_logs.KIND),
+    *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, matrices.STREAM, class_sets.KIND, on_logs.KIND),
     *latencies.KINDS,
     *(own_models.MODEL, predictions.KIND, contracts.CONTRACT),
     *cityscapes.KINDS,
