@@ -135,6 +135,15 @@ def test_runs_of_other_classes_are_reported_apart(place, monkeypatch):
     assert "has other classes than newest (own) of runs/own: report them apart" in both.err
 
 
+def test_a_gate_knows_their_figures(place, monkeypatch):
+    monkeypatch.chdir(place)
+    report = "semgrid-eval report runs/own runs/own --out gate --fail-below"
+    refused = run(f"{report} 'road: -0.01'")
+    assert refused.code == 1
+    assert "fail-below: 'road' is not one of unknown, drivable, " in refused.err
+    assert "row newest has one recording: an interval needs more" in run(f"{report} 'surface: -0.01'").err
+
+
 def test_the_default_set_is_printed_to_begin_with():
     line, _, file = PRINT.partition(" > ")
     assert file == "my_classes.yaml"

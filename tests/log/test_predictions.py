@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.writer import Writer
+from support.own_classes import class_set
 
 from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES
 from semgrid_eval.errors import InputError, LogError
@@ -122,6 +123,16 @@ FAULTS = {
         f"published at {10**18 + 90 * MS} ns, before the capture of its newest input at {10**18 + 90 * MS + 1} ns",
     ),
 }
+
+
+def test_predictions_of_other_classes_than_those_that_are_scored_are_refused(tmp_path):
+    own = class_set({"name": "way", "category": "ground", "labels": ["road"]}, categories=[{"name": "ground"}])
+    extent = EXTENT._replace(classes=own)
+    write_predictions(tmp_path / "a.mcap", [prediction()], "a", EXTENT)
+    with pytest.raises(LogError, match=r"class_names: class 1 is 'road', and 'way' is scored"):
+        list(PredictionLog(tmp_path / "a.mcap").predictions(extent))
+    with pytest.raises(InputError, match=r"classes: 9 is not a class, which are 0 to 1"):
+        write_predictions(tmp_path / "b.mcap", [prediction(classes=np.full((4, 3), 9, np.uint8))], "a", extent)
 
 
 @pytest.mark.parametrize("kind", FAULTS)

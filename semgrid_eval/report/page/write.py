@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from semgrid_eval import __version__
+from semgrid_eval.classes import DEFAULT_CLASSES
 from semgrid_eval.errors import InputError, printable
 from semgrid_eval.files import atomic_folder, locked
 from semgrid_eval.progress import Progress, silent
@@ -99,6 +100,7 @@ def _frame(material: Material) -> dict[str, Any]:
         "script": Markup().join(map(_source, ("page.js", "chooser.js", "examples.js", "colours.js"))),
         "version": __version__,
         "runs": material.runs,
+        "own_classes": shared_iou(material.scores.values()).classes != DEFAULT_CLASSES,
         "title": title_of(material.runs),
         "axes": chooser_axes(material.runs),
         "names": {row.number: row.name for run in material.runs for row in run.rows if row.results},
