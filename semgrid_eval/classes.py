@@ -88,9 +88,9 @@ Side = Annotated[int, Field(ge=1, le=16)]
 class Category(Config):
     """Classes that are scored together; its place in the list is the priority by which its classes are drawn."""
 
-    name: Name
+    name: Name  # lower-case letters, digits and `_`; no class has the same
     # Sides of dilation, erosion, erosion and dilation, by which morphology filters each of its classes (reading 12);
-    # 1 changes nothing. Those of the paper's small and moving classes if not given.
+    # from 1, which changes nothing, to 16. Those of the paper's small and moving classes if not given.
     kernels_cells: tuple[Side, Side, Side, Side] = (1, 1, 2, 2)
     # Whether its classes move by themselves, and how fast: like vehicles or like persons. Not at all if not given.
     moves: Literal["slow", "fast"] | None = None
@@ -99,7 +99,7 @@ class Category(Config):
 class GridClass(Config):
     """A class; its id in grids is its place in the list."""
 
-    name: Name
+    name: Name  # lower-case letters, digits and `_`
     category: Name | None = None  # of `unknown` alone it may be left out: then that is in no category
     colour: Colour  # sRGB, 0 to 255
     safe_colour: Colour | None = None  # for readers with any kind of colour blindness; `colour` if not given
@@ -112,7 +112,7 @@ class ClassSet(Config):
     """Classes with their categories. The first class is `unknown`; it has no labels, and whatever is seen covers it."""
 
     categories: tuple[Category, ...] = Field(min_length=1, max_length=16)  # later ones are drawn over earlier ones
-    classes: tuple[GridClass, ...] = Field(min_length=2, max_length=64)
+    classes: tuple[GridClass, ...] = Field(min_length=2, max_length=64)  # by id
 
     @model_validator(mode="after")
     def _sound(self) -> Self:
