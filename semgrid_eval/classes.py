@@ -280,5 +280,17 @@ def default_classes_text() -> str:
 
 with resources.as_file(_DEFAULT) as _path:
     DEFAULT_CLASSES = load_classes(_path)
+
+
+def classes_of_grid(grid: object, place: str) -> ClassSet:
+    """Return the classes that a grid's configuration, as JSON has it, asks for; `place` is where it stands.
+
+    Raises:
+        ConfigError: they are not a class set.
+    """
+    named = grid.get("classes") if isinstance(grid, dict) else None
+    return DEFAULT_CLASSES if named is None else parse_config(ClassSet, named, path=f"{place}: grid.classes")
+
+
 CLASS_NAMES, CLASS_COUNT = DEFAULT_CLASSES.names, DEFAULT_CLASSES.count
 """Of the default set: for the paper's tables and for whoever has no other."""

@@ -25,7 +25,7 @@ RUN/pictures/<key>.npz         small camera and label images of the windows' fra
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,24 +35,20 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from semgrid_eval.arrays import read_arrays, write_arrays
-from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
+from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet, classes_of_grid
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError, ResultError, first_line
 from semgrid_eval.scores.facts import RowFacts, StreamRecord
-from semgrid_eval.scores.metrics.metric import Metric
-from semgrid_eval.scores.metrics.table import Sums, metrics_of
+from semgrid_eval.scores.metrics.table import METRICS, Sums, metrics_of
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.seals import read_sealed, read_sealed_json, write_sealed_json
 
 FORMAT_VERSION = 2
 RUN_FILE, RESULT_FILE = "run.json", "result.json"
-SUMS_FILE = "sums.npz"
-EXPECTED_FILE = "expected.npz"
-PREDICTIONS_FILE = "predictions.npz"
-STREAM_FILE = "stream.npz"
+SUMS_FILE, EXPECTED_FILE = "sums.npz", "expected.npz"
+PREDICTIONS_FILE, STREAM_FILE, HISTORY_FILE = "predictions.npz", "stream.npz", "history.csv"
 _ANSWERS = ("prediction", "certainty", "for_ns", "capture_ns", "publish_ns", "answer_m", "publish_m")
 _EVALUATIONS = ("evaluated_ns", "evaluated_m", "used", "target", "mask")
-HISTORY_FILE = "history.csv"
 _RUN = "run"  # owns the record of a run, which has no id
 NOT_RUN = "not run yet"
 """What the record of a row says whose turn has not come."""
@@ -112,14 +108,8 @@ class ResultRecord(Config):
 
     @property
     def classes(self) -> ClassSet:
-        """The classes of its grids, as its configuration has them.
-
-        Raises:
-            ConfigError: that is not a class set.
-        """
-        grid = self.config.get("grid")
-        named = grid.get("classes") if isinstance(grid, dict) else None
-        return DEFAULT_CLASSES if named is None else parse_config(ClassSet, named, path=f"{self.id}: grid.classes")
+        """The classes of its grids; a ConfigError says that what its configuration has is not a class set."""
+        return classes_of_grid(self.config.get("grid"), self.id)
 
 
 class RowRecord(Config):
@@ -268,15 +258,13 @@ def read_sums(
 
     `classes` are the result's. Who has called `check_sums` before need not `verify` the file each time.
     """
-    key = (metric, partition)
-    return _read_sums(folder / file, [key], metrics_of(classes), verify=verify).get(key)
+    return _read_sums(folder / file, [(metric, partition)], classes, verify=verify).get((metric, partition))
 
 
 def check_sums(folder: Path, windows: int, classes: ClassSet = DEFAULT_CLASSES, *, has_expected: bool = False) -> None:
     """Read everything that was counted, and forget it; a ResultError says what is missing or malformed."""
-    metrics = metrics_of(classes)
     for file in (SUMS_FILE, EXPECTED_FILE) if has_expected else (SUMS_FILE,):
-        for key, found in _read_sums(folder / file, list(product(metrics, PARTITIONS)), metrics).items():
+        for key, found in _read_sums(folder / file, list(product(METRICS, PARTITIONS)), classes).items():
             if len(found) != windows:
                 fault = f"has {len(found)} windows, and result.json {windows}"
                 raise ResultError(fault, path=folder / file, field=".".join(key))
@@ -288,9 +276,9 @@ def _owner_of_sums(result_id: str, file: str) -> str:
 
 
 def _read_sums(
-    path: Path, keys: Sequence[tuple[str, str]], metrics: Mapping[str, Metric], *, verify: bool = True
+    path: Path, keys: Sequence[tuple[str, str]], classes: ClassSet, *, verify: bool = True
 ) -> dict[tuple[str, str], NDArray[np.int32]]:
-    names = {key: ".".join(key) for key in keys}
+    names, metrics = {key: ".".join(key) for key in keys}, metrics_of(classes)
     needed = tuple(name for key, name in names.items() if key[1] == "all")
     optional = tuple(name for name in names.values() if name not in needed)
     owner = _owner_of_sums(path.parent.name, path.name)

@@ -129,8 +129,11 @@ def test_predictions_of_other_classes_than_those_that_are_scored_are_refused(tmp
     own = class_set({"name": "way", "category": "ground", "labels": ["road"]}, categories=[{"name": "ground"}])
     extent = EXTENT._replace(classes=own)
     write_predictions(tmp_path / "a.mcap", [prediction()], "a", EXTENT)
-    with pytest.raises(LogError, match=r"class_names: class 1 is 'road', and 'way' is scored"):
-        list(PredictionLog(tmp_path / "a.mcap").predictions(extent))
+    with (
+        PredictionLog(tmp_path / "a.mcap") as log,
+        pytest.raises(LogError, match=r"class_names: class 1 is 'road', and 'way' is scored"),
+    ):
+        list(log.predictions(extent))
     with pytest.raises(InputError, match=r"classes: 9 is not a class, which are 0 to 1"):
         write_predictions(tmp_path / "b.mcap", [prediction(classes=np.full((4, 3), 9, np.uint8))], "a", extent)
 

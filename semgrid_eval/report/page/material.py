@@ -9,6 +9,7 @@ from semgrid_eval.report.estimates.bootstrap import (
     Everything,
     Resampling,
     Scores,
+    classes_of,
     everywhere,
     score_all,
     score_regions,
@@ -21,7 +22,7 @@ from semgrid_eval.report.estimates.way import against_expected, order_of
 from semgrid_eval.report.figures import categories, curves, settings
 from semgrid_eval.report.figures.streams import stream_plots
 from semgrid_eval.report.figures.style import Plot
-from semgrid_eval.report.rows.load import Row, Run, classes_of
+from semgrid_eval.report.rows.load import Row, Run
 from semgrid_eval.report.rows.pairing import main_group
 from semgrid_eval.report.rows.words import same_rows
 from semgrid_eval.report.tables.scores import division_tables, score_tables

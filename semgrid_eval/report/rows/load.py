@@ -1,6 +1,6 @@
 """Reads a run's result files; what cannot be read becomes a failure of its row, and the rest goes on."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import count
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.config import parse_config
-from semgrid_eval.errors import ConfigError, InputError, ResultError, SemgridError, first_line
+from semgrid_eval.errors import ConfigError, ResultError, SemgridError, first_line
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores import results as files
@@ -236,23 +236,6 @@ def _fault(kind: str, path: Path, error: ResultError, run: Path) -> Fault:
 def comparable(row: Row, other: Row) -> bool:
     """Tell whether rows may be subtracted: both have results, and these have the same targets, in whichever runs."""
     return row.targets == other.targets != ""
-
-
-def classes_of(rows: Iterable[Row]) -> ClassSet:
-    """Return the classes of rows that are scored side by side; the default ones where no row has a result.
-
-    Raises:
-        InputError: they have different ones, so that their figures have nothing in common.
-    """
-    known: dict[ClassSet, Row] = {}
-    for row in rows:
-        if row.results:
-            known.setdefault(row.classes, row)
-    if len(known) > 1:
-        first, second, *_ = known.values()
-        fault = f"row {second.name} has other classes than {first.name} of {first.run}: report them apart"
-        raise InputError(fault, path=second.run, field="grid.classes")
-    return next(iter(known), DEFAULT_CLASSES)
 
 
 def key_of(window: files.WindowRecord) -> tuple[str, int]:

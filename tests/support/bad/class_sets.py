@@ -94,7 +94,7 @@ KIND = Kind(
     "Here a matrix `bad.yaml` whose row names a set `classes.yaml`; a class stands after `unknown` and `way`.",
     whole,
     (
-        *(Bad(text, RUN, {FILE: _classes(_UNKNOWN, _ROAD, text).encode()}) for text in lines(CLASSES)),
+        *(Bad(f"`{text}`", RUN, {FILE: _classes(_UNKNOWN, _ROAD, text).encode()}) for text in lines(CLASSES)),
         *(Bad(words, RUN, {FILE: text.encode()}) for words, text in FILES.items()),
         *(Bad(words, RUN, {"bad.yaml": content}) for words, content in MATRICES.items()),
     ),
