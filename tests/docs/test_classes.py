@@ -92,7 +92,7 @@ def test_the_page_has_these_classes_and_no_claim_of_the_paper(place):
     page = (place / "runs/own/report/index.html").read_text()
     for words in ("drivable", "pedestrian", "Surface", "Traffic", "People"):
         assert words in page
-    for words in ("pole sign", "large vehicle", "Small dynamic", "--class-6:", "Small static"):
+    for words in ("pole sign", "large vehicle", "Small dynamic", "--class-6:", "Small static", "Static"):
         assert words not in page
     assert "--class-1:#1c3353" in page
     assert "--class-1:#5a5aa0" in page

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from semgrid_eval.classes import known_name
 from semgrid_eval.report.estimates.bootstrap import Everything, Parts, RowScores, Scores, everywhere, shared_iou
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.rows.load import Row, comparable
@@ -18,6 +19,7 @@ from semgrid_eval.report.tables.numbers import ABSENT, MINUS, interval_phrase, n
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, plain_table
 from semgrid_eval.report.tables.targets import not_compared_table
 from semgrid_eval.report.tables.values import difference_table, run_differences, side_by_side, value_table
+from semgrid_eval.scores.metrics.iou import Iou
 from semgrid_eval.scores.metrics.metric import Metric, divided
 from semgrid_eval.scores.metrics.table import IOU, metrics_of
 
@@ -27,10 +29,8 @@ _PAPER = (
 )
 _CATEGORIES = "Category scores: mean of the class IoUs, with 95% interval. Best of each column in bold."
 _CLASSES = "Class IoU with 95% interval."
-_MERGED = (
-    "Category scores after merging the classes of a category, as the Cityscapes benchmark does. "
-    "It leaves void out, as Static (known, merged) leaves out unknown."
-)
+_MERGED = "Category scores after merging the classes of a category, as the Cityscapes benchmark does."
+_VOID = " It leaves void out, as {} leaves out unknown."
 
 
 def score_tables(scores: Scores, tags: Sequence[str], on_cityscapes: Collection[Path] = ()) -> dict[str, Table | None]:
@@ -53,10 +53,16 @@ def score_tables(scores: Scores, tags: Sequence[str], on_cityscapes: Collection[
         "changes": changes_table(scores),
         "disturbances": disturbance_table(scores),
         "not_compared": not_compared_table(scores),
-        "merged": value_table("merged", _MERGED, scores, iou.merged_columns),
+        "merged": value_table("merged", _MERGED + _void(iou), scores, iou.merged_columns),
         "runs": run_differences("runs", in_runs, scores, iou.compared),
         "costs": cost_table(list(scores.values())),
     }
+
+
+def _void(iou: Iou) -> str:
+    """Say which figure leaves `unknown` out, where that is in a category."""
+    left_out = (f"merged_{known_name(name)}" for name in iou.classes.category_names)
+    return "".join(_VOID.format(iou.labels[name]) for name in left_out if name in iou.labels)
 
 
 def confusion_table(entry: RowScores, name: str) -> Table:
