@@ -22,7 +22,7 @@ from semgrid_eval.scores.tidy import load_figures
 
 NAMES = ("unknown", "drivable", "walkable", "fixed", "vehicle", "pedestrian")
 CATEGORIES = ("surface", "obstacle", "traffic", "people")
-RUN, REPORT, PLAY, PRINT = commands(PAGE)
+RUN, REPORT, PLAY = commands(PAGE)
 MODELS = ("newest", "all inputs", "table", "encoder-decoder", "residual")
 
 
@@ -135,6 +135,22 @@ def test_runs_of_other_classes_are_reported_apart(place, monkeypatch):
     assert "has other classes than newest (own) of runs/own: report them apart" in both.err
 
 
+def test_a_result_whose_classes_are_none_is_named_and_the_rest_goes_on(place, monkeypatch):
+    monkeypatch.chdir(place)
+    record = records(place)["table"]
+    spoiled = record.model_copy(update={"config": record.config | {"grid": {"classes": {"categories": []}}}})
+    folder = place / "runs/own/results" / record.id
+    whole = (folder / "result.json").read_bytes()
+    try:
+        results.write_result(folder, spoiled)
+        ended = run("semgrid-eval report runs/own --out spoiled")
+    finally:
+        (folder / "result.json").write_bytes(whole)
+    assert ended.code == 1
+    assert f"{record.id}: grid.classes: categories: must have at least 1 entries, not 0" in ended.err
+    assert "residual" in (place / "spoiled/summary.csv").read_text()
+
+
 def test_a_gate_knows_their_figures(place, monkeypatch):
     monkeypatch.chdir(place)
     report = "semgrid-eval report runs/own runs/own --out gate --fail-below"
@@ -145,9 +161,8 @@ def test_a_gate_knows_their_figures(place, monkeypatch):
 
 
 def test_the_default_set_is_printed_to_begin_with():
-    line, _, file = PRINT.partition(" > ")
-    assert file == "my_classes.yaml"
-    assert run(line).out == default_classes_text()
+    shown = re.search(r"`(grids --print-classes) > my_classes\.yaml` writes out the default set", PAGE)
+    assert run(f"semgrid-eval {shown[1]}").out == default_classes_text()
 
 
 def test_what_the_page_says_of_models_is_so():

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
+from support.own_classes import class_set
 
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, DEFAULT_CLASSES, MASK_COLOUR
 from semgrid_eval.errors import InputError
@@ -38,6 +39,16 @@ def test_each_cell_has_its_class_colour_and_the_mask_is_white(grid, mask):
     got = _colours(_png(masked_picture(("", ""), grid, mask, DEFAULT_CLASSES)))
     assert (got[mask] == MASK_COLOUR).all()
     np.testing.assert_array_equal(got[~mask], DEFAULT_CLASSES.palette(safe=True)[grid[~mask]])
+
+
+def test_64_classes_keep_their_colours():
+    labels = ({"name": f"c{i}", "category": "c", "labels": [i], "colour": [i, 255 - i, 7]} for i in range(1, 64))
+    many, grid = class_set(*labels, categories=[{"name": "c"}]), np.arange(64, dtype=np.uint8).reshape(8, 8)
+    mask = np.zeros((8, 8), np.bool_)
+    mask[0, 0] = True
+    got = _colours(_png(masked_picture(("", ""), grid, mask, many))).reshape(-1, 3)
+    assert tuple(got[0]) == MASK_COLOUR
+    np.testing.assert_array_equal(got[1:], many.palette()[1:])
 
 
 def test_a_label_image_has_the_colours_of_its_classes_and_a_gray_for_what_is_in_no_grid():
