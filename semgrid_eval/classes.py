@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
 from semgrid_eval.config import Config, load_yaml, parse_config
-from semgrid_eval.errors import ConfigError, located
 from semgrid_eval.faults import meant, not_one_of, shown
 
 NO_POINT = 255  # value of the class map for labels that give no point at all: sky, the ego vehicle, void
@@ -122,7 +121,7 @@ class ClassSet(Config):
         for number, entry in enumerate(self.classes):
             self._check(f"classes.{number}", entry)
         for number, name in enumerate(self.category_names):
-            if not set(self.members(name)) - {UNKNOWN}:
+            if not self.known_members(name):
                 raise ValueError(f"categories.{number}.name: no class is in {name}")
         label_ids = self._label_ids()
         if (twice := _repeated(label for labels in label_ids for label in labels)) is not None:
@@ -180,20 +179,24 @@ class ClassSet(Config):
         """Return the ids of the classes that are in any of some categories."""
         return tuple(i for i, entry in enumerate(self.classes) if entry.category in categories)
 
+    def known_members(self, *categories: str) -> tuple[int, ...]:
+        """Return those of them that are not `unknown`."""
+        return tuple(i for i in self.members(*categories) if i != UNKNOWN)
+
     @property
     def background(self) -> tuple[int, ...]:
         """Ids of the known classes of the first category, over which all others are drawn."""
-        return tuple(i for i in self.members(self.category_names[0]) if i != UNKNOWN)
+        return self.known_members(self.category_names[0])
 
     @property
     def movable(self) -> tuple[int, ...]:
         """Ids of the classes that move by themselves."""
-        return self.members(*(category.name for category in self.categories if category.moves))
+        return self.known_members(*(category.name for category in self.categories if category.moves))
 
     @property
     def fast(self) -> tuple[int, ...]:
         """Ids of those that move fast."""
-        return self.members(*(category.name for category in self.categories if category.moves == "fast"))
+        return self.known_members(*(category.name for category in self.categories if category.moves == "fast"))
 
     @property
     def averaged(self) -> Mapping[str, tuple[int, ...]]:
@@ -202,7 +205,7 @@ class ClassSet(Config):
         for name in self.category_names:
             found[name] = self.members(name)
             if UNKNOWN in found[name]:
-                found[known_name(name)] = found[name][1:]
+                found[known_name(name)] = self.known_members(name)
         return {**found, MEAN_KNOWN: self.known}
 
     def kernels_cells(self, class_id: int) -> tuple[int, int, int, int]:
@@ -255,42 +258,10 @@ def load_classes(path: Path | str) -> ClassSet:
     return parse_config(ClassSet, load_yaml(Path(path)), path=path)
 
 
-def with_classes(grid: object, beside: Path, field: str) -> object:
-    """Put the class set of a file in the place of its path, which is relative to the file `beside` that names it.
+DEFAULT_FILE = resources.files("semgrid_eval").joinpath("data/classes.yaml")
+"""Where the default class set is written."""
 
-    A grid's configuration that names no file is returned as it is.
-
-    Raises:
-        ConfigError: names both files, the field and what is wrong.
-    """
-    if not isinstance(grid, dict) or not isinstance(grid.get("classes"), str):
-        return grid
-    with located(path=beside, field=field, kind=ConfigError):
-        found = load_classes(beside.parent / grid["classes"])
-    return grid | {"classes": found.model_dump(mode="json")}
-
-
-_DEFAULT = resources.files("semgrid_eval").joinpath("data/classes.yaml")
-
-
-def default_classes_text() -> str:
-    """Return the file of the default class set, to copy."""
-    return _DEFAULT.read_text(encoding="utf-8")
-
-
-with resources.as_file(_DEFAULT) as _path:
+with resources.as_file(DEFAULT_FILE) as _path:
     DEFAULT_CLASSES = load_classes(_path)
-
-
-def classes_of_grid(grid: object, place: str) -> ClassSet:
-    """Return the classes that a grid's configuration, as JSON has it, asks for; `place` is where it stands.
-
-    Raises:
-        ConfigError: they are not a class set.
-    """
-    named = grid.get("classes") if isinstance(grid, dict) else None
-    return DEFAULT_CLASSES if named is None else parse_config(ClassSet, named, path=f"{place}: grid.classes")
-
-
 CLASS_NAMES, CLASS_COUNT = DEFAULT_CLASSES.names, DEFAULT_CLASSES.count
 """Of the default set: for the paper's tables and for whoever has no other."""

@@ -3,6 +3,7 @@ import pytest
 import yaml
 from support.own_classes import FILE, class_set
 
+from semgrid_eval.class_files import default_classes_text, with_classes
 from semgrid_eval.classes import (
     CITYSCAPES_LABELS,
     CLASS_NAMES,
@@ -10,13 +11,12 @@ from semgrid_eval.classes import (
     NO_POINT,
     UNKNOWN,
     ClassSet,
-    default_classes_text,
     label_ids_from_train_ids,
     load_classes,
-    with_classes,
 )
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
+from semgrid_eval.scores.metrics.iou import Iou
 
 OWN = parse_config(ClassSet, yaml.safe_load(FILE))
 
@@ -94,6 +94,19 @@ def test_a_set_carries_all_that_is_asked_of_classes():
     assert OWN.palette()[1].tolist() == [90, 90, 160]
     assert OWN.palette(safe=True)[1].tolist() == [28, 51, 83]
     assert OWN.palette(safe=True)[0].tolist() == [0, 0, 0], "what is not given is the colour"
+
+
+def test_unknown_moves_nowhere_whatever_its_category_does():
+    entry = {"category": "all", "colour": [0, 0, 0]}
+    listed = [{"name": "unknown", **entry}, {"name": "merged_lane", "labels": ["road"], **entry}]
+    still = parse_config(ClassSet, {"categories": [{"name": "all", "moves": "slow"}], "classes": listed})
+    assert (still.movable, still.fast, still.background) == ((1,), (), (1,))
+    iou = Iou(still)
+    assert iou.moving == ("merged_lane",)
+    assert list(iou.labels) == [
+        "unknown", "merged_lane", "all", "all_known", "mean_known", "merged_all", "merged_all_known"
+    ]  # fmt: skip
+    assert iou.cells(np.array([[3, 1], [2, 5]])).tolist() == [4, 7, 11, 7, 7, 11, 7]
 
 
 def test_unknown_in_a_category_gives_it_two_means():

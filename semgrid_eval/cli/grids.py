@@ -10,7 +10,7 @@ from semgrid_eval.cli.options import FOLDER, THERE, chosen_executor, executor_op
 
 def _print_classes(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     if wanted:
-        from semgrid_eval.classes import default_classes_text
+        from semgrid_eval.class_files import default_classes_text
 
         click.echo(default_classes_text(), nl=False)
         ctx.exit()
@@ -36,7 +36,7 @@ def command(logs: Path, out: Path, config: Path | None, workers: int, executor: 
 
     Each recording is built once for a configuration and found again by the digest of log and configuration.
     """
-    from semgrid_eval.classes import with_classes
+    from semgrid_eval.class_files import with_classes
     from semgrid_eval.config import load_yaml, parse_config
     from semgrid_eval.grids.build import build_grids
     from semgrid_eval.grids.spec import GridConfig

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import Field
 
-from semgrid_eval.classes import with_classes
+from semgrid_eval.class_files import with_classes
 from semgrid_eval.config import Config, load_yaml, merged, parse_config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.faults import meant, not_one_of, shown

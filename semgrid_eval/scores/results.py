@@ -35,7 +35,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from semgrid_eval.arrays import read_arrays, write_arrays
-from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet, classes_of_grid
+from semgrid_eval.class_files import classes_of_grid
+from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError, ResultError, first_line
 from semgrid_eval.scores.facts import RowFacts, StreamRecord
@@ -50,8 +51,7 @@ PREDICTIONS_FILE, STREAM_FILE, HISTORY_FILE = "predictions.npz", "stream.npz", "
 _ANSWERS = ("prediction", "certainty", "for_ns", "capture_ns", "publish_ns", "answer_m", "publish_m")
 _EVALUATIONS = ("evaluated_ns", "evaluated_m", "used", "target", "mask")
 _RUN = "run"  # owns the record of a run, which has no id
-NOT_RUN = "not run yet"
-"""What the record of a row says whose turn has not come."""
+NOT_RUN = "not run yet"  # what the record of a row says whose turn has not come
 
 
 class LogRecord(Config):

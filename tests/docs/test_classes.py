@@ -12,7 +12,8 @@ from support.own_classes import FILE, MATRIX, PAGE
 from support.pages import commands
 from support.toy_world import street
 
-from semgrid_eval.classes import DEFAULT_CLASSES, default_classes_text, load_classes
+from semgrid_eval.class_files import default_classes_text
+from semgrid_eval.classes import DEFAULT_CLASSES, load_classes
 from semgrid_eval.log.container import Container
 from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
 from semgrid_eval.log.store import write_log

@@ -3,6 +3,7 @@
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from semgrid_eval.classes import ClassSet
 from semgrid_eval.report.claims.claims import on_cityscapes
 from semgrid_eval.report.claims.findings import Finding, find
 from semgrid_eval.report.estimates.bootstrap import (
@@ -13,6 +14,7 @@ from semgrid_eval.report.estimates.bootstrap import (
     everywhere,
     score_all,
     score_regions,
+    shared_iou,
 )
 from semgrid_eval.report.estimates.division import of_cells
 from semgrid_eval.report.estimates.leads import best_leads, lead_series
@@ -50,6 +52,11 @@ class Material:
     same: Mapping[str, str]  # rows that are left out of tables and figures, since they are another one by another name
     streams: Sequence[Strategy] = ()
     best_leads: Mapping[str, float] = field(default_factory=dict)  # in ms by category
+
+    @property
+    def classes(self) -> ClassSet:
+        """The classes of all rows."""
+        return shared_iou(self.scores.values()).classes
 
 
 def gather(runs: Sequence[Run], resampling: Resampling) -> Material:

@@ -15,7 +15,7 @@ from semgrid_eval.files import atomic_folder, locked
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.report.claims.claims import MARGIN
 from semgrid_eval.report.claims.findings import Finding, finding_table, missing_table, sentence
-from semgrid_eval.report.estimates.bootstrap import SEED, Level, Parts, Resampling, shared_iou
+from semgrid_eval.report.estimates.bootstrap import SEED, Level, Parts, Resampling
 from semgrid_eval.report.estimates.paces import EDGES_MPS
 from semgrid_eval.report.examples.drawing import MASK_LEGEND, RIGHT_LEGEND, SHARE_ENDS, class_legend, class_style
 from semgrid_eval.report.examples.errors import FEWEST_WINDOWS, error_maps
@@ -94,13 +94,11 @@ def render_page(material: Material) -> str:
 def _frame(material: Material) -> dict[str, Any]:
     """Return what the page is made with, and what its parts share."""
     return {
-        "style": Markup(class_style(shared_iou(material.scores.values()).classes))
-        + _source("style.css")
-        + _source("examples.css"),
+        "style": Markup(class_style(material.classes)) + _source("style.css") + _source("examples.css"),
         "script": Markup().join(map(_source, ("page.js", "chooser.js", "examples.js", "colours.js"))),
         "version": __version__,
         "runs": material.runs,
-        "own_classes": shared_iou(material.scores.values()).classes != DEFAULT_CLASSES,
+        "own_classes": material.classes != DEFAULT_CLASSES,
         "title": title_of(material.runs),
         "axes": chooser_axes(material.runs),
         "names": {row.number: row.name for run in material.runs for row in run.rows if row.results},
@@ -125,7 +123,7 @@ def _pictures(material: Material, found: Headline | None) -> dict[str, Any]:
         "examples": examples,
         "gaps": gaps(rows, examples),
         "widths": widths(rows),
-        "legend": (*class_legend(shared_iou(material.scores.values()).classes), MASK_LEGEND),
+        "legend": (*class_legend(material.classes), MASK_LEGEND),
         "right_legend": RIGHT_LEGEND,
         "errors": error_maps(rows),
         "share_ends": SHARE_ENDS,

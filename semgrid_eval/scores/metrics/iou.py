@@ -33,15 +33,15 @@ class Iou(Metric):
     def __init__(self, classes: ClassSet) -> None:
         self.classes = classes
         self.shape = (classes.count, classes.count)
-        self._averaged, merged = classes.averaged, {**classes.averaged}
-        del merged[MEAN_KNOWN]
+        self._averaged = classes.averaged
+        self._merged = {name: ids for name, ids in self._averaged.items() if name != MEAN_KNOWN}
         self.category_columns = tuple(self._averaged)
-        self.merged_columns = tuple(f"merged_{name}" for name in merged)
+        self.merged_columns = tuple(f"merged_{name}" for name in self._merged)
         self.ratio_names = (*classes.names, *self.merged_columns)
         words, names = self._words(), (*classes.names, *self.category_columns, *self.merged_columns)
         self.columns = tuple(Column(name, words[name]) for name in names)
         self.labels = {column.name: column.label for column in self.columns}
-        self._groups = [(i,) for i in range(classes.count)] + list(merged.values())  # behind each ratio
+        self._groups = [(i,) for i in range(classes.count)] + list(self._merged.values())  # behind each ratio
 
     def _words(self) -> Mapping[str, str]:
         """Return what figures are called in words, by their names."""
@@ -67,7 +67,7 @@ class Iou(Metric):
             if category.moves == "fast":
                 found.append(category.name)
             elif category.moves:
-                found += [self.classes.names[i] for i in self.classes.members(category.name)]
+                found += [self.classes.names[i] for i in self.classes.known_members(category.name)]
         return tuple(found)
 
     def count(self, scored: ScoredWindows, regions: Regions) -> Counts:
@@ -103,8 +103,7 @@ class Iou(Metric):
     @cached_property
     def _membership(self) -> NDArray[np.int64]:
         """Which classes stand behind each figure: (Q, C)."""
-        table = {**self._averaged, **{name: (i,) for i, name in enumerate(self.classes.names)}}
-        behind = [table[name.removeprefix("merged_")] for name in self.labels]
+        behind = [*((i,) for i in range(self.classes.count)), *self._averaged.values(), *self._merged.values()]
         return np.array([[i in ids for i in range(self.classes.count)] for ids in behind], np.int64)
 
 
