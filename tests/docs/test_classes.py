@@ -148,7 +148,7 @@ def test_a_result_whose_classes_are_none_is_named_and_the_rest_goes_on(place, mo
     finally:
         (folder / "result.json").write_bytes(whole)
     assert ended.code == 1
-    assert f"{record.id}: grid.classes: categories: must have at least 1 entries, not 0" in ended.err
+    assert f"{record.id}: grid.classes: categories: must not be empty" in ended.err
     assert "residual" in (place / "spoiled/summary.csv").read_text()
 
 
