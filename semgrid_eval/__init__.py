@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     from semgrid_eval.api import write_log as write_log
     from semgrid_eval.api import write_report as write_report
     from semgrid_eval.classes import CLASS_NAMES as CLASS_NAMES
-    from semgrid_eval.classes import CLASSES as CLASSES
+    from semgrid_eval.classes import DEFAULT_CLASSES as DEFAULT_CLASSES
     from semgrid_eval.classes import LABEL_ID as LABEL_ID
+    from semgrid_eval.classes import ClassSet as ClassSet
+    from semgrid_eval.classes import load_classes as load_classes
     from semgrid_eval.config import Config as Config
     from semgrid_eval.errors import SemgridError as SemgridError
     from semgrid_eval.grids.recording import GridRecording as GridRecording
@@ -60,7 +62,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "api": "build_grids check_log convert find_logs fit load_run make_model make_windows open_log plot_grid "
     "run score write_log write_report",
-    "classes": "CLASSES CLASS_NAMES LABEL_ID",
+    "classes": "CLASS_NAMES ClassSet DEFAULT_CLASSES LABEL_ID load_classes",
     "config": "Config",
     "errors": "SemgridError",
     "grids.recording": "GridRecording",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.executors import local_executor
@@ -29,8 +29,7 @@ from semgrid_eval.recording.types import Recording
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores.metrics.iou import confusion
-from semgrid_eval.scores.metrics.metric import column_names
-from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores.metrics.table import iou_of
 from semgrid_eval.scores.results import RunRecord
 from semgrid_eval.scores.tidy import load_figures
 from semgrid_eval.sources.known import SOURCES, load_source
@@ -105,6 +104,7 @@ def plot_grid(
     *,
     mask: NDArray[np.bool_] | None = None,
     spec: GridSpec | None = None,
+    classes: ClassSet = DEFAULT_CLASSES,
     axes: "Axes | None" = None,
 ) -> "Axes":
     """Draw a grid (H, W) of class ids in the report's colours, in metres around the vehicle, mask M (H, W) in white.
@@ -113,11 +113,15 @@ def plot_grid(
     """
     from semgrid_eval.report.figures.grid import draw_grid  # so that matplotlib is imported only to plot
 
-    return draw_grid(grid, mask=mask, spec=spec or GridSpec(), axes=axes)
+    return draw_grid(grid, mask=mask, spec=spec or GridSpec(), classes=classes, axes=axes)
 
 
 def score(
-    target: NDArray[np.uint8], prediction: NDArray[np.uint8], *, mask: NDArray[np.bool_] | None = None
+    target: NDArray[np.uint8],
+    prediction: NDArray[np.uint8],
+    *,
+    mask: NDArray[np.bool_] | None = None,
+    classes: ClassSet = DEFAULT_CLASSES,
 ) -> dict[str, float]:
     """Score predicted class ids: grids (H, W) or (N, H, W), pooled -> IoU by class, category and merged category.
 
@@ -131,13 +135,13 @@ def score(
     if len(shape) < 2 or not shape == np.shape(prediction) == left_out.shape:
         raise InputError(f"shapes are {shape}, {np.shape(prediction)} and {left_out.shape}", field="score")
     for name, grid in (("target", target), ("prediction", prediction)):
-        if np.size(grid) and not 0 <= np.min(grid) <= np.max(grid) < CLASS_COUNT:
-            raise InputError(f"has ids outside 0 to {CLASS_COUNT - 1}", field=name)
+        if np.size(grid) and not 0 <= np.min(grid) <= np.max(grid) < classes.count:
+            raise InputError(f"has ids outside 0 to {classes.count - 1}", field=name)
     flat = (-1, *shape[-2:])
     seen, guessed = (np.asarray(grid, np.uint8).reshape(flat) for grid in (target, prediction))
-    counts = confusion(seen, guessed, left_out.reshape(flat))
-    figures = IOU.figures(IOU.ratios(counts.sum(axis=0)))
-    return dict(zip(column_names(IOU), figures.tolist(), strict=True))
+    counts, iou = confusion(seen, guessed, left_out.reshape(flat), classes.count), iou_of(classes)
+    figures = iou.figures(iou.ratios(counts.sum(axis=0)))
+    return dict(zip(iou.labels, figures.tolist(), strict=True))
 
 
 def make_windows(
@@ -145,7 +149,7 @@ def make_windows(
     config: WindowConfig | None = None,
     *,
     sensors: Sequence[str] = (),
-    spec: GridSpec | None = None,
+    grid: GridConfig | None = None,
     translate: bool = True,
 ) -> WindowSet:
     """Take every window of some recordings: inputs of the past, in the target's place, and the target.
@@ -154,14 +158,14 @@ def make_windows(
         recordings: as `build_grids` makes them, all of one configuration.
         config: inputs, steps and horizon.
         sensors: names of the inputs' sensors; that of the target if not given.
-        spec: extent of the grids, as they were made.
+        grid: by which the grids were made.
         translate: whether inputs are moved into the target's place.
 
     Raises:
         InputError: no recording is long enough, or there is no such sensor.
     """
-    spec = spec or GridSpec()
-    data = stack_recordings(recordings, cell_m=spec.cell_m)
+    grid = grid or GridConfig()
+    data = stack_recordings(recordings, cell_m=grid.spec.cell_m, classes=grid.classes)
     windows = training_windows(data.frame_counts, config or WindowConfig()).windows
     return select_windows(data, windows, sensors=sensors or [data.target], translate=translate)
 
@@ -177,8 +181,8 @@ def make_model(
         InputError: there is no such model, or the settings are not its own.
     """
     made = registry.find_model(model) if isinstance(model, str) else model
-    rows, columns = windows.data.grids.shape[-2:]
-    given = Given(windows.sensors, windows.inputs.shape[1], rows, columns, windows.data.cell_m, windows.translate)
+    data, (rows, columns) = windows.data, windows.data.grids.shape[-2:]
+    given = Given(windows.sensors, windows.inputs.shape[1], rows, columns, data.cell_m, windows.translate, data.classes)
     chosen = made.parse_settings(dict(settings or {}), path="settings")
     made.check(chosen, given)
     return seeded_network(made, chosen, given, seed) if issubclass(made, Network) else made(chosen, given)

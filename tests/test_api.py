@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.own_classes import class_set
 from support.small_runs import TINY, WINDOW, write_logs
 
 import semgrid_eval as sg
@@ -27,7 +28,8 @@ def test_every_public_name_is_there():
 
 
 def test_importing_it_imports_neither_torch_nor_matplotlib():
-    code = "import sys, semgrid_eval; semgrid_eval.CLASSES; print({'torch', 'matplotlib', 'cv2'} & set(sys.modules))"
+    used = "import sys, semgrid_eval; semgrid_eval.DEFAULT_CLASSES"
+    code = f"{used}; print({{'torch', 'matplotlib', 'cv2'}} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
 
@@ -77,6 +79,18 @@ def test_a_grid_is_drawn_in_metres_with_its_mask_in_white():
     (image,) = axes.get_images()
     assert image.get_extent() == [50.0, -50.0, 0.0, 100.0]
     assert image.get_array()[0, 0].tolist() == [255, 255, 255]
+
+
+def test_own_classes_are_scored_and_drawn_as_they_are():
+    named = ({"name": f"c{i}", "category": "all", "colour": [9 * i, 0, 0], "labels": [i]} for i in (1, 2))
+    classes = class_set(*named, categories=[{"name": "all"}])
+    target, prediction = np.array([[0, 1, 1, 2]], np.uint8), np.array([[0, 1, 2, 2]], np.uint8)
+    found = sg.score(target, prediction, classes=classes)
+    assert found == {"unknown": 1.0, "c1": 0.5, "c2": 0.5, "all": 0.5, "mean_known": 0.5, "merged_all": 1.0}
+    (image,) = sg.plot_grid(target, classes=classes).get_images()
+    assert image.get_array()[0].tolist() == [[0, 0, 0], [9, 0, 0], [9, 0, 0], [18, 0, 0]]
+    with pytest.raises(InputError, match="prediction: has ids outside 0 to 2"):
+        sg.score(target, prediction + 1, classes=classes)
 
 
 def test_faults_are_told_in_one_line(tmp_path):

@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN, category_members
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, DEFAULT_CLASSES, UNKNOWN
 from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.build import build_log
@@ -36,8 +36,7 @@ LEAST_CELLS = 100  # of a class that is told
 _SAME_NS = 1_000_000
 LIDAR = GridConfig(sensors={"lidar": LidarSensor()}, target=("lidar",), stretch_frames=100_000)
 CAMERA = GridConfig(sensors={"camera": CameraSensor()}, target=("camera",), stretch_frames=100_000)
-_MEMBERS = category_members()
-_STATIC = np.isin(np.arange(CLASS_COUNT), [*_MEMBERS["static"], *_MEMBERS["small_static"]])
+_STATIC = np.isin(np.arange(CLASS_COUNT), DEFAULT_CLASSES.members("static", "small_static"))
 Cells = NDArray[np.uint8]
 Flags = NDArray[np.bool_]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_eval.classes import class_palette, label_palette
+from semgrid_eval.classes import DEFAULT_CLASSES, label_palette
 from semgrid_eval.files import atomic_file
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
@@ -33,7 +33,7 @@ def draw_log(path: Path) -> Picture:
     """Draw the first frame of a log and its grid, side by side: (height, width, 3) sRGB."""
     with LogReader(path) as log:
         frame = next(log.frames(log.scene.cameras[0], images=True))
-    grid = class_palette()[build_log(path, GridConfig())[0].grids[0, 0]]
+    grid = DEFAULT_CLASSES.palette()[build_log(path, GridConfig())[0].grids[0, 0]]
     image = np.asarray(Image.open(io.BytesIO(frame.image_file or b"")).convert("RGB"))
     label = label_palette()[decode_gray(frame.label_png or b"", bit_depth=8)]
     disparity = decode_gray(frame.disparity_png, bit_depth=16)

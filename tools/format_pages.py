@@ -18,6 +18,7 @@ from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from semgrid_eval.classes import Category, ClassSet, GridClass
 from semgrid_eval.config import Config
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.models.augment import AugmentConfig
@@ -43,6 +44,9 @@ MATRIX: tuple[tuple[str, type[Config]], ...] = (
     ("`window`", WindowConfig),
     ("`grid`", GridConfig),
     ("`grid.spec`", GridSpec),
+    ("`grid.classes`", ClassSet),
+    ("`grid.classes.categories`", Category),
+    ("`grid.classes.classes`", GridClass),
     *((f"`grid.sensors`: kind `{name}`", kind.config) for name, kind in KINDS.items()),
     ("`colour_from` of a `lidar`", ColourFrom),
     ("`stream`", StreamConfig),

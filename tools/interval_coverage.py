@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.report.estimates.bootstrap import LABELS, interval_of, recording_weights, stretched
+from semgrid_eval.report.estimates.bootstrap import interval_of, recording_weights, stretched
 from semgrid_eval.report.estimates.division import EVERYWHERE, row_sums
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.metrics.table import IOU
@@ -51,7 +51,7 @@ def of_run(run: Path, names: tuple[str, str], column: str) -> tuple[World, float
     """Recordings of a run, each as likely as the others, and the difference of two rows over all of them."""
     rows = {row.name: row for row in load_runs([run])[0].rows}
     sums = [row_sums(rows[name], IOU, EVERYWHERE)[0].parts[0] for name in names]
-    at = list(LABELS).index(column)
+    at = list(IOU.labels).index(column)
     ratios = np.stack([part.ratios for part in sums], axis=1)  # (R, 2, K, 2)
     whole = np.concatenate([sums[0].cells[:, at, None], ratios.reshape(len(ratios), -1)], axis=1).astype(np.float64)
 

@@ -16,7 +16,8 @@ from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.report.rows.load import Row, load_runs
-from semgrid_eval.scores.metrics.iou import averaged_members, category_iou, class_iou
+from semgrid_eval.scores.metrics.iou import class_iou
+from semgrid_eval.scores.metrics.table import IOU
 
 COLUMNS = {
     "static_known": "static (known)",
@@ -39,7 +40,7 @@ def lines(rows: Sequence[Row], logs: Sequence[Path]) -> Iterator[str]:
         cost_ms = costs.setdefault(grid.model_dump_json(), -1.0)
         if cost_ms < 0:
             cost_ms = costs[grid.model_dump_json()] = frame_ms(grid, logs)
-        scores = category_iou(class_iou(row.results[0].counts.sum(axis=0)))
+        scores = IOU.means(class_iou(row.results[0].counts.sum(axis=0)))
         values = [f"{scores[name]:.3f}".removeprefix("0") for name in COLUMNS]
         shares = [f"{area_m2 / of:.0%}" for area_m2, of in zip(areas_m2(row), plain, strict=True)]
         yield f"| {' | '.join([row.name, *values, *shares, f'{cost_ms:.1f}'])} |"
@@ -48,7 +49,7 @@ def lines(rows: Sequence[Row], logs: Sequence[Path]) -> Iterator[str]:
 def areas_m2(row: Row) -> list[float]:
     """Return the area of the targets of a row in the classes behind each column."""
     cells = row.results[0].counts.sum(axis=(0, 2)) * grid_of(row).spec.cell_m ** 2
-    return [float(cells[list(averaged_members()[name])].sum()) for name in COLUMNS]
+    return [float(cells[list(IOU.classes.averaged[name])].sum()) for name in COLUMNS]
 
 
 def grid_of(row: Row) -> GridConfig:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from semgrid_eval.classes import MASK_COLOUR, class_palette
+from semgrid_eval.classes import DEFAULT_CLASSES, MASK_COLOUR
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file
 from semgrid_eval.scores.results import read_predictions, read_result, read_run, read_windows, result_folder
@@ -21,7 +21,7 @@ GAP_PX = 6
 
 def tile(grid: np.ndarray, mask: np.ndarray | None = None) -> Image.Image:
     """Draw one grid (H, W), each cell `SCALE` pixels wide."""
-    colours = class_palette(safe=True)[grid]
+    colours = DEFAULT_CLASSES.palette(safe=True)[grid]
     picture = Image.fromarray(
         colours if mask is None else np.where(mask[..., None], MASK_COLOUR, colours).astype(np.uint8)
     )

@@ -57,9 +57,9 @@ def measure_cells(material: Material) -> Iterator[Measurement]:
     projection = Projection(*view)
 
     def ours() -> NDArray[np.uint8]:
-        seen, counts = projection.points(disparity, label), no_points(config.spec)
+        seen, counts = projection.points(disparity, label), no_points(config)
         add_points(counts, Points("full", 0, seen.forward_m, seen.left_m, seen.class_id), turned, config.spec)
-        return rasterise(counts, "off")
+        return rasterise(counts, config.classes, "off")
 
     def rival() -> NDArray[np.uint8]:
         return grid_by_arrays(disparity, label, view, turned, config.spec)
@@ -75,7 +75,7 @@ def measure_scoring(settings: Settings) -> Iterator[Measurement]:
     random, count = np.random.default_rng(0), min(SCORED_WINDOWS, 8 * settings.windows)
     target, prediction = random.integers(0, CLASS_COUNT, (2, count, 128, 128), dtype=np.uint8)
     left_out = random.random(target.shape) < 0.1
-    ours = partial(confusion, target, prediction, left_out)
+    ours = partial(confusion, target, prediction, left_out, CLASS_COUNT)
     rival = partial(confusion_by_definition, target, prediction, left_out)
     if not np.array_equal(ours(), rival()):
         raise AssertionError("Cityscapes' way finds other counts")

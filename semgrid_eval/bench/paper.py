@@ -14,7 +14,6 @@ from semgrid_eval.report.rows.load import Row as ReadRow
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.runs.matrix import Matrix, load_matrix
 from semgrid_eval.runs.row import Row, plan_units
-from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS
 from semgrid_eval.scores.metrics.table import IOU
 
 ORDER = (
@@ -88,10 +87,10 @@ def _row(entry: RowScores, scores: Mapping[str, RowScores], scaled: Mapping[str,
         "validation_loss": None if history is None else float(history["validation_loss"].iloc[-1]),
         "parameters": record.parameters,
         "windows": entry.windows,
-        "scores": {column: _plain(entry.estimate(column)) for column in CATEGORY_COLUMNS},
+        "scores": {column: _plain(entry.estimate(column)) for column in IOU.category_columns},
         "scores_at_cpu_scale": scaled,
         "minus": {
-            other.row.name: {column: _plain(entry.minus(other, column)) for column in CATEGORY_COLUMNS}
+            other.row.name: {column: _plain(entry.minus(other, column)) for column in IOU.category_columns}
             for other in others
             if other.row.targets == entry.row.targets
         },
@@ -105,7 +104,7 @@ def _plain(estimate: Estimate) -> list[float]:
 
 def _scaled_scores(report: Path) -> dict[str, dict[str, float]]:
     table = pd.read_csv(report / "summary.csv").pivot_table(index="row", columns="score", values="iou")
-    return {str(name): {c: round(float(row[c]), 4) for c in CATEGORY_COLUMNS} for name, row in table.iterrows()}
+    return {str(name): {c: round(float(row[c]), 4) for c in IOU.category_columns} for name, row in table.iterrows()}
 
 
 def price_of_paper(run: Path) -> dict[str, object]:

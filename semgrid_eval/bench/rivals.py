@@ -10,7 +10,7 @@ import numpy as np
 from mcap.reader import make_reader
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, NO_POINT, priorities
+from semgrid_eval.classes import CLASS_COUNT, DEFAULT_CLASSES, NO_POINT
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.spec import GridSpec
 from semgrid_eval.recording.types import CameraCalibration
@@ -46,7 +46,9 @@ def grid_by_arrays(disparity: Image, label: Image, view: View, grid_from_vehicle
     depth_m = camera.fx_px * camera.baseline_m * 256.0 / (disparity[used] - 1.0)
     place_m = np.array([[camera.x_m], [camera.y_m]]) + depth_m * slope[:, used]
     counts = _counted(place_m, class_id[used], grid_from_vehicle, spec)
-    rank = np.where(counts > 0, priorities()[:, None, None].astype(np.int64) * 2 * counts.max() + counts, 0)
+    rank = np.where(
+        counts > 0, DEFAULT_CLASSES.priorities()[:, None, None].astype(np.int64) * 2 * counts.max() + counts, 0
+    )
     return np.asarray(rank.argmax(axis=0), np.uint8)
 
 

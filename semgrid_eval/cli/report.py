@@ -48,16 +48,18 @@ def command(
 
     --fail-below makes a gate of two runs, an earlier and a later one. Rows are paired by name; the difference of their
     IoU is taken recording by recording, and a limit fails where the whole interval lies below it. It may be repeated,
-    with classes (road), categories (vehicles) and their mean (mean_known). Rows with other targets are refused.
+    with classes (road), categories (vehicles), the run's own ones, and their mean (mean_known). Rows with other targets
+    are refused.
     """
-    from semgrid_eval.report.estimates.gate import parse_limit
+    from semgrid_eval.report.estimates.gate import columns_of, parse_limit
     from semgrid_eval.report.page.write import write_report  # here, so that `--help` does not wait for matplotlib
 
     if limits and len(runs) != 2:
         raise click.UsageError("--fail-below compares two runs, an earlier and a later one")
     if rows and not limits:
         raise click.UsageError("--row says what --fail-below compares")
-    kept = [parse_limit(each) for each in limits]
+    columns = columns_of(runs[0]) if limits else ()
+    kept = [parse_limit(each, columns) for each in limits]
     damages = list[str]()
     with progress("reading results") as shown:
         page = write_report(runs, out, resample=resample, progress=shown, damaged=damages.append)

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import UnknownTruthError
 from semgrid_eval.geometry import SE2
-from semgrid_eval.grids.rasterise import grid_of
+from semgrid_eval.grids.rasterise import grid_of, no_points
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import FrameLog, WindowTimes, plain_png
 from semgrid_eval.log.reader import LogReader
@@ -52,7 +51,7 @@ class Draws:
         redrawing, camera = redrawing_of(log), _camera_of(log, config)
         exact = _ExactPictures(log, camera)
         motion = EgoMotion(log.motion(), config.integrator)
-        found = np.zeros((len(times.target_ns), CLASS_COUNT, config.spec.rows, config.spec.columns), np.uint8)
+        found = np.zeros((len(times.target_ns), *no_points(config).shape), np.uint8)
         newest_ns = times.inputs_ns[:, -1] if self.continued else times.target_ns
         for window in np.argsort(newest_ns, kind="stable"):  # the errors go on from one newest input to the next
             target_ns = int(times.target_ns[window])
@@ -111,7 +110,7 @@ def _votes(log: LogReader, config: GridConfig, drawn: Iterable[Pictures], place:
         for draw, each in enumerate(drawn)
     ]
     by_draw = defaultdict[int, list[Points]](list)
-    votes = np.zeros((CLASS_COUNT, config.spec.rows, config.spec.columns), np.uint8)
+    votes = no_points(config).astype(np.uint8)
     with FrameLog(log.path, frames) as shown:
         for points in read_points(
             shown, {name: config.sensors[name] for name in config.target}, config.class_by_label()
@@ -119,5 +118,5 @@ def _votes(log: LogReader, config: GridConfig, drawn: Iterable[Pictures], place:
             by_draw[points.stamp_ns].append(points)
             if len(by_draw[points.stamp_ns]) == len(config.target):
                 grid = grid_of(((seen, place) for seen in by_draw.pop(points.stamp_ns)), config)
-                votes += grid == np.arange(CLASS_COUNT, dtype=np.uint8)[:, None, None]
+                votes += grid == np.arange(config.classes.count, dtype=np.uint8)[:, None, None]
     return votes

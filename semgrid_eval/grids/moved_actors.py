@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASSES, Category
 from semgrid_eval.errors import UnknownTruthError
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.rasterise import Cells, grid_of
@@ -26,8 +25,6 @@ Ids = NDArray[np.int64]
 Floats = NDArray[np.float64]
 MOVES_FROM_M = 0.1
 """Who moves less until the target's time stays where an input shows him."""
-_CAN_MOVE = np.zeros(256, np.bool_)  # by grid class, `NO_POINT` among them
-_CAN_MOVE[: len(CLASSES)] = [entry.category in (Category.VEHICLES, Category.SMALL_DYNAMIC) for entry in CLASSES]
 
 
 class Mover(NamedTuple):
@@ -87,9 +84,10 @@ def _seen(
         raise UnknownTruthError(f"whom sensor {name} sees is not known, as it is no camera", path=log.path)
     frames = [each for each in log.frames(log.choose_camera(sensor.camera)) if each.stamp_ns in stamps_ns]
     instances = [_instances(log, sensor, frame) for frame in frames]
+    movable = np.array(config.classes.movable, np.uint8)
     with FrameLog(log.path, frames) as shown:
         for points, ids in zip(read_points(shown, {name: sensor}, config.class_by_label()), instances, strict=True):
-            yield points.stamp_ns, (points, np.where(_CAN_MOVE[points.class_id], ids, 0))
+            yield points.stamp_ns, (points, np.where(np.isin(points.class_id, movable), ids, 0))
 
 
 def _instances(log: LogReader, sensor: CameraSensor, frame: CameraFrame) -> Ids:

@@ -1,14 +1,14 @@
 """Discretisation D: labelled points to cells by priority, and class-wise morphology (readings 12 and 13)."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import cv2
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, CLASSES, NO_POINT, UNKNOWN, Category, priorities
+from semgrid_eval.classes import NO_POINT, UNKNOWN, ClassSet
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.sensors.sensor import Morphology, Points
@@ -16,20 +16,10 @@ from semgrid_eval.sensors.sensor import Morphology, Points
 Cells = NDArray[np.uint8]
 Counts = NDArray[np.int32]
 
-STATIC_KERNELS_CELLS = (3, 2, 4, 4)
-OTHER_KERNELS_CELLS = (1, 1, 2, 2)
-"""Sides of dilation, erosion, erosion, dilation in cells (supplement, "semantic grid generation").
 
-They are cells at every size of cell: on a grid of half the cell size the closing bridges gaps of half the length, and
-the opening removes what is half as wide. So grids of different cell sizes are filtered differently in metres.
-"""
-
-_PRIORITIES = priorities()
-
-
-def no_points(spec: GridSpec) -> Counts:
+def no_points(config: GridConfig) -> Counts:
     """Return counts (C, rows, columns) of no point, to add some to."""
-    return np.zeros((CLASS_COUNT, spec.rows, spec.columns), np.int32)
+    return np.zeros((config.classes.count, config.spec.rows, config.spec.columns), np.int32)
 
 
 def add_points(counts: Counts, points: Points, grid_from_points: SE2, spec: GridSpec) -> None:
@@ -57,44 +47,49 @@ def grid_of(seen: Iterable[tuple[Points, SE2]], config: GridConfig) -> Cells:
     """
     parts: dict[Morphology, Counts] = {}
     for points, grid_from_points in seen:
-        counts = parts.setdefault(config.morphology_of(points.sensor), no_points(config.spec))
+        counts = parts.setdefault(config.morphology_of(points.sensor), no_points(config))
         add_points(counts, points, grid_from_points, config.spec)
     if len(parts) == 1:
         ((morphology, counts),) = parts.items()
-        return rasterise(counts, morphology)
-    total = sum(parts.values(), no_points(config.spec))
+        return rasterise(counts, config.classes, morphology)
+    total = sum(parts.values(), no_points(config))
     layers = np.zeros(total.shape, np.bool_)
     for morphology, counts in parts.items():
-        layers |= _layers(counts, morphology)
-    merged: Cells = _strongest(total, layers, _PRIORITIES)
+        layers |= _layers(counts, config.classes, morphology)
+    merged: Cells = _strongest(total, layers, config.classes.priorities())
     return merged
 
 
-def rasterise(counts: Counts, morphology: Morphology = "minkowski") -> Cells:
+def rasterise(counts: Counts, classes: ClassSet, morphology: Morphology = "minkowski") -> Cells:
     """Decide the class of each cell: (C, H, W) point counts -> (H, W) class ids.
 
     The class of highest priority wins, then the one with more points, then the lower id. Morphology works on each
     class alone; its results are merged by the same rule.
     """
-    grid: Cells = _strongest(counts, _layers(counts, morphology), _PRIORITIES)
+    grid: Cells = _strongest(counts, _layers(counts, classes, morphology), classes.priorities())
     return grid
 
 
-def _layers(counts: Counts, morphology: Morphology) -> NDArray[np.bool_]:
-    """Tell for each class which cells are its own, after morphology: (C, H, W) -> (C, H, W)."""
+def _layers(counts: Counts, classes: ClassSet, morphology: Morphology) -> NDArray[np.bool_]:
+    """Tell for each class which cells are its own, after morphology: (C, H, W) -> (C, H, W).
+
+    Kernels are cells at every size of cell: on a grid of half the cell size the closing bridges gaps of half the
+    length, and the opening removes what is half as wide. So grids of different cell sizes are filtered differently in
+    metres.
+    """
     if morphology == "off":
         return np.asarray(counts > 0)
-    grid: Cells = _strongest(counts, counts > 0, _PRIORITIES)
+    grid: Cells = _strongest(counts, counts > 0, classes.priorities())
     layers = np.zeros(counts.shape, np.bool_)
     for class_id in np.unique(grid):
         if class_id != UNKNOWN:
-            layers[class_id] = _filter_class((grid == class_id).astype(np.uint8), int(class_id), morphology)
+            sides = classes.kernels_cells(int(class_id))
+            layers[class_id] = _filter_class((grid == class_id).astype(np.uint8), sides, morphology)
     return layers
 
 
-def _filter_class(layer: Cells, class_id: int, morphology: Morphology) -> NDArray[np.bool_]:
-    sizes = STATIC_KERNELS_CELLS if CLASSES[class_id].category is Category.STATIC else OTHER_KERNELS_CELLS
-    for operation, size in zip((cv2.dilate, cv2.erode, cv2.erode, cv2.dilate), sizes, strict=True):
+def _filter_class(layer: Cells, sides: Sequence[int], morphology: Morphology) -> NDArray[np.bool_]:
+    for operation, size in zip((cv2.dilate, cv2.erode, cv2.erode, cv2.dilate), sides, strict=True):
         if size == 1:
             continue
         # OpenCV reads the kernel at anchor k // 2 in both operations. A Minkowski dilation needs its reflection,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, NO_POINT, class_map
+from semgrid_eval.classes import DEFAULT_CLASSES, LABEL_ID, NO_POINT, ClassSet
 from semgrid_eval.config import Config
 from semgrid_eval.faults import meant, not_one_of
 from semgrid_eval.motion import Integrator
@@ -64,8 +64,11 @@ class GridConfig(Config):
     target: tuple[str, ...] = Field(("full",), min_length=1)
     integrator: Integrator = "euler"  # of the egomotion, as in the paper; `EgoMotion` has the other (reading 17)
     morphology: Morphology = "minkowski"  # of sensors that have none of their own; the paper's (reading 12)
+    # The classes of cells, as docs/classes.md says; in a file also the path of one, relative to it. The default is not
+    # written, so that grids of it keep their digests.
+    classes: ClassSet = Field(DEFAULT_CLASSES, exclude_if=lambda classes: classes == DEFAULT_CLASSES)
     stretch_frames: int = Field(30, ge=2, le=100_000)  # length of a recording; longer logs are cut (reading 18)
-    # Grid class, or none, by Cityscapes label name; replaces single entries of the default (reading 21).
+    # Grid class, or none, by Cityscapes label name; replaces single labels of `classes` (reading 21).
     class_map: dict[str, str | None] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -78,8 +81,8 @@ class GridConfig(Config):
         for label, name in self.class_map.items():
             if label not in LABEL_ID:
                 raise ValueError(f"class_map: {label!r} is not a Cityscapes label{meant(label, LABEL_ID)}")
-            if name is not None and name not in CLASS_NAMES:
-                raise ValueError(f"class_map.{label}: {not_one_of(name, CLASS_NAMES)}")
+            if name is not None and name not in self.classes.names:
+                raise ValueError(f"class_map.{label}: {not_one_of(name, self.classes.names)}")
         return self
 
     @property
@@ -113,7 +116,7 @@ class GridConfig(Config):
 
     def class_by_label(self) -> NDArray[np.uint8]:
         """Return the table (256,) from label id to grid class with this configuration's replacements (reading 21)."""
-        table = class_map()
+        table = self.classes.class_by_label()
         for label, name in self.class_map.items():
-            table[LABEL_ID[label]] = NO_POINT if name is None else CLASS_NAMES.index(name)
+            table[LABEL_ID[label]] = NO_POINT if name is None else self.classes.names.index(name)
         return table

@@ -11,7 +11,7 @@ from foxglove_schemas_protobuf.Vector2_pb2 import Vector2
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_NAMES, MASK_COLOUR, UNKNOWN, class_palette
+from semgrid_eval.classes import MASK_COLOUR, UNKNOWN, ClassSet
 from semgrid_eval.log.codec import timestamp
 from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
 from semgrid_eval.log.topics import GRID_FRAME
@@ -44,11 +44,16 @@ def _rgba(colours: NDArray[np.integer], first: int = 0) -> Values:
     return rgba
 
 
-CLASSES = GridLayer("class_id", _rgba(class_palette()), CLASS_NAMES)
-CLASSES.rgba[UNKNOWN, 3] = 0  # layers that are drawn over each other do not hide what another one knows
+def class_layer(classes: ClassSet) -> GridLayer:
+    """Return the layer of class ids; unknown is transparent, so that it does not hide what a layer below it knows."""
+    layer = GridLayer("class_id", _rgba(classes.palette()), classes.names)
+    layer.rgba[UNKNOWN, 3] = 0
+    return layer
+
+
 MASK = GridLayer("masked", _rgba(np.array([MASK_COLOUR]), first=1), ("scored", "left_out"))
 CERTAINTY = GridLayer("certainty", _rgba(np.repeat(np.arange(256)[:, None], 3, axis=1)))
-"""Layers of grids: class ids, the mask M (1 = left out of scores), the highest score of a cell (255 = 1)."""
+"""Layers of grids: the mask M (1 = left out of scores), the highest score of a cell (255 = 1)."""
 
 
 def viewer_message(stamp_ns: int, values: Values, layer: GridLayer, place: GridPlace) -> Grid:

@@ -10,12 +10,12 @@ import numpy as np
 from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
+from semgrid_eval.classes import ClassSet
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.files import atomic_file
 from semgrid_eval.log.codec import PREDICTIONS_RECORD, stamp_ns, timestamp
 from semgrid_eval.log.container import MAX_STAMP_NS, Container, Entry
-from semgrid_eval.log.grids import CLASSES, GridPlace, exact_message
+from semgrid_eval.log.grids import GridLayer, GridPlace, class_layer, exact_message
 from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
 from semgrid_eval.log.topics import GRID_PREDICTION
 from semgrid_eval.log.writer import MessageWriter
@@ -29,11 +29,12 @@ Values = NDArray[np.uint8]
 
 
 class GridExtent(NamedTuple):
-    """Size of grids in cells, and where they are."""
+    """Size of grids in cells, where they are, and their classes."""
 
     rows: int
     columns: int
     place: GridPlace
+    classes: ClassSet
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +48,9 @@ class Prediction:
     certainty: Values | None = None  # (H, W) of its class, 255 = 1; certain everywhere where it does not say
 
 
-def prediction_message(prediction: Prediction, place: GridPlace) -> SemanticGrid:
+def prediction_message(prediction: Prediction, layer: GridLayer, place: GridPlace) -> SemanticGrid:
     """Write a prediction as a message, without its publication, which is the message's own."""
-    message = exact_message(prediction.for_ns, prediction.classes, CLASSES, place)
+    message = exact_message(prediction.for_ns, prediction.classes, layer, place)
     message.capture_time.CopyFrom(timestamp(prediction.capture_ns))
     if prediction.certainty is not None:
         message.certainty = np.ascontiguousarray(prediction.certainty, np.uint8).tobytes()
@@ -62,7 +63,7 @@ def write_predictions(path: Path, predictions: Iterable[Prediction], recording: 
     Raises:
         InputError: there is none, one is of another size, has ids that are not classes, or times that cannot be.
     """
-    count, before_ns = 0, 0
+    count, before_ns, layer = 0, 0, class_layer(extent.classes)
     with atomic_file(path) as stream, MessageWriter(stream) as writer:
         writer.metadata(PREDICTIONS_RECORD, {RECORDING: recording})
         for prediction in predictions:
@@ -70,7 +71,7 @@ def write_predictions(path: Path, predictions: Iterable[Prediction], recording: 
             if fault:
                 raise InputError(fault, path=path, field=f"prediction for {prediction.for_ns} ns")
             before_ns, count = prediction.publish_ns, count + 1
-            writer.write(TOPIC, prediction_message(prediction, extent.place), log_ns=prediction.publish_ns)
+            writer.write(TOPIC, prediction_message(prediction, layer, extent.place), log_ns=prediction.publish_ns)
         if not count:
             raise InputError("there is no prediction to write", path=path)
     return count
@@ -156,13 +157,13 @@ def _fault_of_message(message: SemanticGrid, extent: GridExtent) -> str | None:
     cells = extent.rows * extent.columns
     if fault := _fault_of_extent(message, extent):
         return fault
-    if fault := _fault_of_names(tuple(message.class_names)):
+    if fault := _fault_of_names(tuple(message.class_names), extent.classes.names):
         return f"class_names: {fault}"
     for name, size in (("class_ids", len(message.class_ids)), ("certainty", len(message.certainty) or cells)):
         if size != cells:
             return f"{name}: {size} bytes, and {cells} cells need as many"
-    if (largest := max(message.class_ids)) >= CLASS_COUNT:
-        return f"class_ids: {largest} is not a class, which are 0 to {CLASS_COUNT - 1}"
+    if fault := _fault_of_ids(max(message.class_ids), extent.classes):
+        return f"class_ids: {fault}"
     missing = [name for name in ("timestamp", "capture_time") if not message.HasField(name)]
     return f"{missing[0]}: is missing" if missing else None
 
@@ -179,11 +180,15 @@ def _fault_of_extent(message: SemanticGrid, extent: GridExtent) -> str | None:
     return None
 
 
-def _fault_of_names(names: tuple[str, ...]) -> str | None:
-    for number, (name, known) in enumerate(zip(names, CLASS_NAMES, strict=False)):
+def _fault_of_names(names: tuple[str, ...], scored: tuple[str, ...]) -> str | None:
+    for number, (name, known) in enumerate(zip(names, scored, strict=False)):
         if name != known:
             return f"class {number} is {name!r}, and {known!r} is scored"
-    return None if len(names) == CLASS_COUNT else f"{len(names)} classes, and {CLASS_COUNT} are scored"
+    return None if len(names) == len(scored) else f"{len(names)} classes, and {len(scored)} are scored"
+
+
+def _fault_of_ids(largest: int, classes: ClassSet) -> str | None:
+    return f"{largest} is not a class, which are 0 to {classes.count - 1}" if largest >= classes.count else None
 
 
 def _fault_of_values(prediction: Prediction, extent: GridExtent) -> str | None:
@@ -193,8 +198,8 @@ def _fault_of_values(prediction: Prediction, extent: GridExtent) -> str | None:
             continue
         if values.shape != shape or values.dtype != np.uint8:
             return f"{name}: {values.dtype} {values.shape}, and uint8 {shape} is needed"
-    largest = int(prediction.classes.max())
-    return f"classes: {largest} is not a class, which are 0 to {CLASS_COUNT - 1}" if largest >= CLASS_COUNT else None
+    fault = _fault_of_ids(int(prediction.classes.max()), extent.classes)
+    return f"classes: {fault}" if fault else None
 
 
 def _fault_of_times(prediction: Prediction, before_ns: int) -> str | None:

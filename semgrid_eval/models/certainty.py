@@ -6,7 +6,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 FITTED_WINDOWS = 256  # at most, spread evenly over the training windows
@@ -25,10 +24,10 @@ class Certainty(nn.Module):
     slope: Tensor  # (C,) of the probability's logit
     offset: Tensor  # (C,)
 
-    def __init__(self) -> None:
+    def __init__(self, classes: int) -> None:
         super().__init__()
-        self.register_buffer("slope", torch.ones(CLASS_COUNT))
-        self.register_buffer("offset", torch.zeros(CLASS_COUNT))
+        self.register_buffer("slope", torch.ones(classes))
+        self.register_buffer("offset", torch.zeros(classes))
 
     def forward(self, probabilities: Tensor) -> Tensor:
         """Scale scores (B, C, H, W) so that the highest of a cell is the share of right cells expected there."""
@@ -45,7 +44,7 @@ class Certainty(nn.Module):
             windows: those that it was trained on.
         """
         logits, predicted, right = (torch.cat(part) for part in zip(*_answers(probabilities, windows), strict=True))
-        for each in range(CLASS_COUNT):
+        for each in range(len(self.slope)):
             here = predicted == each
             if here.any():
                 slope, offset = _fitted(logits[here].double(), right[here].double())

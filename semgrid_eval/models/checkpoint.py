@@ -6,7 +6,6 @@ import json
 import logging
 import pickle
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -116,7 +115,7 @@ def save_weights(
     header = {
         "model": type(network).__name__,
         "settings": network.settings.model_dump(mode="json"),
-        "given": asdict(network.given),
+        "given": network.given.described(),
         "seal": open_seal(owner),
         **notes,
     }

@@ -7,7 +7,6 @@ from pydantic import Field, field_validator
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.model import Given
 from semgrid_eval.models.network import Constants, Network, NetworkSettings, input_planes
@@ -57,7 +56,7 @@ class EncoderDecoder(Network):
             for inputs, outputs in pairs
         )
         self.narrow = nn.Conv2d(settings.features, settings.features // 2, 3, padding=1)
-        self.classify = nn.Conv2d(settings.features // 2, CLASS_COUNT, 1)
+        self.classify = nn.Conv2d(settings.features // 2, given.classes.count, 1)
         if constants == "keras":
             self.apply(_initialise_as_keras)
         self.prior = CellPrior(given) if settings.prior else None
@@ -87,7 +86,7 @@ class EncoderDecoder(Network):
 
     def forward(self, batch: WindowBatch) -> Tensor:
         """Score the target: (B, C, H, W) logits."""
-        logits = self.from_planes(input_planes(batch.past))
+        logits = self.from_planes(input_planes(batch.past, self.given.classes.count))
         return logits.float() + self.prior(batch) if self.prior is not None else logits
 
     def from_planes(self, planes: Tensor) -> Tensor:

@@ -1,4 +1,4 @@
-"""BL-Flow: vehicles, and on request persons and bicycles, go on as they moved between the two newest inputs.
+"""BL-Flow: what moves fast, and on request what moves slowly, goes on as they moved between the two newest inputs.
 
 Everything else is BL-Fuse. Motion that is not there costs more than motion that is missed: the same car seen from
 another side, or one of a parked row and then its neighbour, look like motion too. So a component moves only if all the
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from torch import Tensor
 
-from semgrid_eval.classes import CLASSES, UNKNOWN, Category
+from semgrid_eval.classes import UNKNOWN, ClassSet
 from semgrid_eval.config import Config
 from semgrid_eval.models.model import Baseline, one_hot
 from semgrid_eval.models.overlay import overlay
@@ -23,19 +23,14 @@ from semgrid_eval.windows.data import WindowBatch
 Grid = NDArray[np.uint8]
 Cells = NDArray[np.int64]
 
-MOVABLE = tuple(
-    number for number, entry in enumerate(CLASSES) if entry.category in (Category.VEHICLES, Category.SMALL_DYNAMIC)
-)
-
-_IS_STATIC = np.array([entry.category is Category.STATIC for entry in CLASSES]) & (np.arange(len(CLASSES)) != UNKNOWN)
-
 
 class FlowSettings(Config):
     """What counts as evidence of motion; a component of cells that lacks any of it stays where BL-Fuse has it."""
 
-    speed_limit_mps: float = Field(20.0, ge=0, le=100)  # faster vehicles are taken for a mix-up of two
-    # The same for persons and bicycles. By default they stay: even a cyclist comes no farther than two cells between
-    # two inputs, and moving them gained nothing on simulated towns.
+    # Classes that move fast, vehicles: what is faster is taken for a mix-up of two.
+    speed_limit_mps: float = Field(20.0, ge=0, le=100)
+    # The same for those that move slowly, persons and bicycles. By default they stay: even a cyclist comes no farther
+    # than two cells between two inputs, and moving them gained nothing on simulated towns.
     small_speed_limit_mps: float = Field(0.0, ge=0, le=100)
     least_cells: int = Field(3, ge=1)  # smaller components are taken for noise
     least_motion_cells: float = Field(2.0, gt=0)  # shorter motion is taken for rounding, of grids and of ego motion
@@ -69,22 +64,23 @@ class MoveOn(Baseline):
         """Return BL-Fuse's overlay with what moves moved on, as certain scores: (B, C, H, W)."""
         layers = torch.stack([overlay(grids) for grids in batch.past.flip(2).unbind(dim=2)], dim=1)  # newest first
         if layers.shape[1] < 2:
-            return one_hot(layers[:, 0])
+            return one_hot(layers[:, 0], self.given.classes.count)
         lead_s = batch.lead_s.cpu().numpy()[:, ::-1]
         result = [self._moved_on(*window) for window in zip(layers.cpu().numpy(), lead_s, strict=True)]
-        return one_hot(torch.from_numpy(np.stack(result)).to(layers.device))
+        return one_hot(torch.from_numpy(np.stack(result)).to(layers.device), self.given.classes.count)
 
     def _moved_on(self, layers: Grid, lead_s: NDArray[np.float32]) -> Grid:
         """Predict one window: layers (T, H, W) and their (T,) times to the target, newest first -> (H, W)."""
         gap_s = float(lead_s[1] - lead_s[0])
-        moves = find_moves(layers[1], layers[0], gap_s / self.given.cell_m, self.settings)
+        classes = self.given.classes
+        moves = find_moves(layers[1], layers[0], gap_s / self.given.cell_m, classes, self.settings)
         bare = layers.copy()
         for move in moves:
             bare[0][tuple(move.newer.T)] = UNKNOWN
             bare[1][tuple(move.older.T)] = UNKNOWN
         result: Grid = overlay(torch.from_numpy(bare)[None])[0].numpy().copy()
         for move in moves:
-            _fill(result, move.newer)
+            _fill(result, move.newer, classes)
         for move in moves:
             ahead = move.newer + np.rint(move.shift * (lead_s[0] / gap_s)).astype(np.int64)
             inside = ((ahead >= 0) & (ahead < result.shape)).all(axis=1)
@@ -92,16 +88,16 @@ class MoveOn(Baseline):
         return result
 
 
-def find_moves(older: Grid, newer: Grid, cells_per_mps: float, config: FlowSettings) -> list[Move]:
+def find_moves(older: Grid, newer: Grid, cells_per_mps: float, classes: ClassSet, config: FlowSettings) -> list[Move]:
     """Match components of two aligned grids (H, W) that show motion, each of them once.
 
     `cells_per_mps` is how many cells a speed of 1 m/s makes between them.
     """
     moves: list[Move] = []
-    for class_id in MOVABLE:
+    for class_id in classes.movable:
         before, after = (_components(grid == class_id, config.least_cells) for grid in (older, newer))
-        is_vehicle = CLASSES[class_id].category is Category.VEHICLES
-        reach_cells = cells_per_mps * (config.speed_limit_mps if is_vehicle else config.small_speed_limit_mps)
+        is_fast = class_id in classes.fast
+        reach_cells = cells_per_mps * (config.speed_limit_mps if is_fast else config.small_speed_limit_mps)
         pairs = [_match(class_id, first, second, reach_cells, config) for first in before for second in after]
         moves += _once([move for move in pairs if move is not None and _is_motion(move, older, newer, config)])
     return moves
@@ -157,11 +153,11 @@ def _once(moves: list[Move]) -> list[Move]:
     return kept
 
 
-def _fill(grid: Grid, cells: Cells) -> None:
-    """Give cells that nothing is known of the commonest static class around the component."""
+def _fill(grid: Grid, cells: Cells, classes: ClassSet) -> None:
+    """Give cells that nothing is known of the commonest class of the background around the component."""
     hidden = np.zeros(grid.shape, np.uint8)
     hidden[tuple(cells.T)] = 1
     around = (cv2.dilate(hidden, np.ones((3, 3), np.uint8)) > 0) & (hidden == 0)
-    counts = np.bincount(grid[around], minlength=len(CLASSES)) * _IS_STATIC
+    counts = np.bincount(grid[around], minlength=classes.count) * np.isin(np.arange(classes.count), classes.background)
     if counts.any():
         grid[(hidden > 0) & (grid == UNKNOWN)] = counts.argmax()

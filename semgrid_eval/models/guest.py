@@ -128,7 +128,7 @@ class _Guest:
         assert self._model is not None, "it was fitted before"
         seen = batch_on(batch, self._device)
         with torch.inference_mode():
-            scores = require_answer(self._model.predict(seen), seen, self._model.called)
+            scores = require_answer(self._model.predict(seen), seen, self._model)
             found = scores.detach().cpu().contiguous()
             content = found.view(torch.uint8).numpy().tobytes()
         return {"type": str(found.dtype).removeprefix("torch.")}, content

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 import torch
 from torch import Tensor
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES
+from semgrid_eval.classes import CLASS_COUNT, DEFAULT_CLASSES, ClassSet
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError
 from semgrid_eval.windows.data import WindowBatch, WindowSet
@@ -29,6 +29,7 @@ class Given:
     columns: int  # W
     cell_m: float  # edge of a cell
     translate: bool  # whether inputs are moved into the target's place
+    classes: ClassSet = DEFAULT_CLASSES  # of inputs and target
 
     @property
     def grids(self) -> int:
@@ -38,7 +39,13 @@ class Given:
     @property
     def planes(self) -> int:
         """Channels of these grids as one-hot planes, S times T times C."""
-        return self.grids * CLASS_COUNT
+        return self.grids * self.classes.count
+
+    def described(self) -> dict[str, object]:
+        """Return all of it as JSON values, for digests; the default classes are left out."""
+        told = {key: value for key, value in vars(self).items() if key != "classes"}
+        is_default = self.classes == DEFAULT_CLASSES
+        return told if is_default else {**told, "classes": self.classes.model_dump(mode="json")}
 
 
 class AnswersIn(NamedTuple):
@@ -139,24 +146,28 @@ class Baseline(Model):
     files = ()
 
 
-def one_hot(classes: Tensor) -> Tensor:
-    """Turn class ids into certain scores: (B, H, W) uint8 -> (B, C, H, W) float32."""
-    ids = torch.arange(CLASS_COUNT, dtype=torch.uint8, device=classes.device)
+def one_hot(classes: Tensor, count: int = CLASS_COUNT) -> Tensor:
+    """Turn ids of so many classes, by default the default set's, into certain scores: (B, H, W) -> (B, C, H, W).
+
+    Ids are uint8, scores float32.
+    """
+    ids = torch.arange(count, dtype=torch.uint8, device=classes.device)
     return (classes[:, None] == ids[:, None, None]).float()
 
 
-def require_answer(answer: object, batch: WindowBatch, name: str) -> Tensor:
+def require_answer(answer: object, batch: WindowBatch, model: Model) -> Tensor:
     """Return an answer to a batch, scores or logits, if it is of the type and shape (B, C, H, W) that is asked for.
 
     Raises:
         InputError: it is not; the message begins with the name of its model.
     """
+    name, classes = model.called, model.given.classes
     if not isinstance(answer, Tensor):
         raise InputError(f"gave {type(answer).__name__} where a tensor is needed", field=name)
     count, rows, columns = batch.target.shape
-    needed = (count, CLASS_COUNT, rows, columns)
-    if answer.ndim == 4 and answer.shape[1] < CLASS_COUNT and answer.shape[0] == count:
-        missing = ", ".join(CLASS_NAMES[answer.shape[1] :])
+    needed = (count, classes.count, rows, columns)
+    if answer.ndim == 4 and answer.shape[1] < classes.count and answer.shape[0] == count:
+        missing = ", ".join(classes.names[answer.shape[1] :])
         raise InputError(f"scores {answer.shape[1]} classes, and {missing} are missing", field=name)
     if answer.shape != needed:
         raise InputError(f"gave shape {tuple(answer.shape)} where {needed} is needed", field=name)
@@ -165,18 +176,18 @@ def require_answer(answer: object, batch: WindowBatch, name: str) -> Tensor:
     return answer
 
 
-def require_scores(answer: object, batch: WindowBatch, name: str) -> Tensor:
+def require_scores(answer: object, batch: WindowBatch, model: Model) -> Tensor:
     """Return an answer if it is scores, all finite and the highest of each cell between 0 and 1, as `predict` says.
 
     Raises:
         InputError: it is not; the message begins with the name of its model.
     """
-    scores = require_answer(answer, batch, name)
+    scores = require_answer(answer, batch, model)
     if not bool(torch.isfinite(scores).all()):
-        raise InputError("gave scores that are NaN or infinite", field=name)
+        raise InputError("gave scores that are NaN or infinite", field=model.called)
     low, high = (float(value) for value in torch.aminmax(scores.amax(dim=1)))
     if not -_SCORE_TOLERANCE <= low <= high <= 1 + _SCORE_TOLERANCE:
-        raise InputError(f"is certain from {low:g} to {high:g}, and scores go from 0 to 1", field=name)
+        raise InputError(f"is certain from {low:g} to {high:g}, and scores go from 0 to 1", field=model.called)
     return scores
 
 

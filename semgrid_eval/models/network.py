@@ -121,7 +121,7 @@ class Network(Model, torch.nn.Module):
 
     def __init__(self, settings: Any, given: Given) -> None:  # noqa: ANN401 - of the class `Settings`
         super().__init__(settings, given)
-        self.certainty = Certainty() if self.training_config.calibrate else None
+        self.certainty = Certainty(given.classes.count) if self.training_config.calibrate else None
 
     def prepare(self, windows: WindowSet) -> None:
         """Set what a training starts from by its windows, before the first update; most networks need nothing."""
@@ -201,22 +201,23 @@ def jaccard_loss(logits: Tensor, target: Tensor, mask: Tensor) -> Tensor:
     """
     counted = ~mask[:, None]
     probability = logits.float().softmax(dim=1) * counted
-    truth = one_hot(target) * counted
+    truth = one_hot(target, logits.shape[1]) * counted
     both, seen = (probability * truth).sum(dim=(0, 2, 3)), truth.sum(dim=(0, 2, 3))
     union = probability.sum(dim=(0, 2, 3)) + seen - both
     present = seen > 0
     return (present * (1 - (both + 1) / (union + 1))).sum() / present.sum().clamp(min=1)
 
 
-def input_planes(past: Tensor) -> Tensor:
+def input_planes(past: Tensor, classes: int = CLASS_COUNT) -> Tensor:
     """Spread all inputs over channels: (B, S, T, H, W) uint8 -> (B, S * T * C, H, W) in channels-last memory.
 
-    The planes have the type that layers compute in.
+    The planes have the type that layers compute in; there are as many of each grid as `classes`, by default those of
+    the default set.
     """
     device = past.device.type
     lower = device != "meta" and torch.is_autocast_enabled(device)  # meta: only shapes are asked for
     dtype = torch.get_autocast_dtype(device) if lower else torch.float32
-    ids = torch.arange(CLASS_COUNT, dtype=torch.uint8, device=past.device)
+    ids = torch.arange(classes, dtype=torch.uint8, device=past.device)
     planes = past.flatten(1, 2).permute(0, 2, 3, 1).unsqueeze(-1) == ids  # (B, H, W, S * T, C)
     return planes.flatten(3).to(dtype).permute(0, 3, 1, 2)
 

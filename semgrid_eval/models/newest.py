@@ -14,4 +14,4 @@ class RepeatNewest(Baseline):
 
     def predict(self, batch: WindowBatch) -> Tensor:
         """Return the newest grid as certain scores: (B, C, H, W)."""
-        return one_hot(batch.past[:, 0, -1])
+        return one_hot(batch.past[:, 0, -1], self.given.classes.count)

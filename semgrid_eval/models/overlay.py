@@ -48,7 +48,7 @@ class OverlaySensors(Baseline):
     def predict(self, batch: WindowBatch) -> Tensor:
         """Return the overlay as certain scores: (B, C, H, W)."""
         order = sorted(range(len(batch.sensors)), key=lambda row: self.settings.top not in batch.sensors[row])
-        return one_hot(overlay(batch.past[:, order, -1]))
+        return one_hot(overlay(batch.past[:, order, -1]), self.given.classes.count)
 
 
 class FuseAll(Baseline):
@@ -61,4 +61,4 @@ class FuseAll(Baseline):
 
     def predict(self, batch: WindowBatch) -> Tensor:
         """Return the overlay as certain scores: (B, C, H, W)."""
-        return one_hot(overlay(newest_first(batch)))
+        return one_hot(overlay(newest_first(batch)), self.given.classes.count)

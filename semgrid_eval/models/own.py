@@ -99,7 +99,7 @@ class _GuardedNetwork(_Guarded, Network):
         own = replace(batch, shift_cells=batch.shift_cells.clone(), lead_s=batch.lead_s.clone())
         with self._guard():
             # What is no number ends a training by its loss, which says more.
-            return require_answer(super().forward(own), batch, self._own_name)
+            return require_answer(super().forward(own), batch, self)
 
     def loss(self, logits: Tensor, batch: WindowBatch) -> Tensor:
         with self._guard():

@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor, nn
 
-from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
+from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.models.model import Given
 from semgrid_eval.models.overlay import newest_first
 from semgrid_eval.windows.data import WindowBatch, WindowSet
@@ -23,8 +23,8 @@ class CellPrior(nn.Module):
 
     def __init__(self, given: Given, *, lead_bins: int = 1, lead_span_s: float = 1.2) -> None:
         super().__init__()
-        self._lead_bins, self._lead_span_s = lead_bins, lead_span_s
-        self.table = nn.Parameter(torch.zeros(lead_bins * given.grids * CLASS_COUNT**2, CLASS_COUNT))
+        self._lead_bins, self._lead_span_s, self._classes = lead_bins, lead_span_s, given.classes.count
+        self.table = nn.Parameter(torch.zeros(lead_bins * given.grids * self._classes**2, self._classes))
 
     def count(self, windows: WindowSet) -> None:
         """Set the table to what training windows show outside M."""
@@ -33,7 +33,7 @@ class CellPrior(nn.Module):
         chosen = torch.linspace(0, len(windows) - 1, wanted).round().long().to(windows.inputs.device)
         for part in torch.split(chosen, _BATCH):
             batch = windows.batch(part)
-            cells = self._rows(batch) * CLASS_COUNT + batch.target
+            cells = self._rows(batch) * self._classes + batch.target
             counts += torch.bincount(cells[~batch.mask], minlength=counts.numel()).cpu().view_as(counts)
         log = counts.log()
         with torch.no_grad():
@@ -55,4 +55,4 @@ class CellPrior(nn.Module):
             newest = torch.where(first, grid, newest)
         lead = batch.lead_s[:, -1] * (self._lead_bins / self._lead_span_s)
         bin_number = lead.long().clamp(0, self._lead_bins - 1)[:, None, None]
-        return ((bin_number * grids.shape[1] + age) * CLASS_COUNT + newest) * CLASS_COUNT + before
+        return ((bin_number * grids.shape[1] + age) * self._classes + newest) * self._classes + before

@@ -45,4 +45,4 @@ class Recorded(Model):
         if batch.answers is None:
             raise InputError("its answers are in logs, which only `semgrid-eval run` reads", field=self.called)
         classes, certainty = batch.answers.to(batch.past.device).unbind(dim=1)
-        return torch.where(one_hot(classes) > 0, certainty[:, None].float() / 255, -1.0)
+        return torch.where(one_hot(classes, self.given.classes.count) > 0, certainty[:, None].float() / 255, -1.0)

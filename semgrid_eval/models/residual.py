@@ -8,9 +8,9 @@ from pydantic import Field
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.classes import ClassSet
+from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.augment import AugmentConfig
-from semgrid_eval.models.flow import MOVABLE
 from semgrid_eval.models.model import Given
 from semgrid_eval.models.network import (
     LossConfig,
@@ -68,11 +68,11 @@ class Residual(Network):
         self.narrow = nn.ModuleList(_Convolution(before, after, stride=2) for before, after in pairwise(widths))
         self.widen = nn.ModuleList(nn.Conv2d(after, before, 1) for before, after in pairwise(widths))
         self.up = nn.ModuleList(_Pair(width) for width in widths[:-1])
-        fine = settings.fine or CLASS_COUNT
+        fine = settings.fine or given.classes.count
         self.unfold = nn.Conv2d(widths[0], fine * FOLD**2, 1)
         self.fine = _Fine(given.planes, fine) if settings.fine else None
-        self.classify = nn.Conv2d(fine, CLASS_COUNT, 1)
-        self.shift = _ShiftMixture(widths[0], settings.shift) if settings.shift else None
+        self.classify = nn.Conv2d(fine, given.classes.count, 1)
+        self.shift = _ShiftMixture(widths[0], settings.shift, given.classes) if settings.shift else None
         if settings.prior:
             nn.init.zeros_(self.classify.weight)
             nn.init.zeros_(torch.as_tensor(self.classify.bias))
@@ -84,6 +84,12 @@ class Residual(Network):
         told = ", told the lead" * settings.lead_input
         return f"residual network of {' / '.join(map(str, settings.widths))} channels" + told
 
+    @classmethod
+    def check(cls, settings: ResidualSettings, given: Given) -> None:
+        """Refuse to move what does not."""
+        if settings.shift and not given.classes.movable:
+            raise ConfigError("no class of grid.classes moves, and that is what it is for", field="settings.shift")
+
     def prepare(self, windows: WindowSet) -> None:
         """Count the table."""
         if self.prior is not None:
@@ -91,7 +97,7 @@ class Residual(Network):
 
     def forward(self, batch: WindowBatch) -> Tensor:
         """Score the target: (B, C, H, W) logits."""
-        planes = input_planes(batch.past)
+        planes = input_planes(batch.past, self.given.classes.count)
         rows, columns = planes.shape[-2:]
         multiple = FOLD * 2 ** len(self.narrow)
         planes = F.pad(planes, (0, -columns % multiple, 0, -rows % multiple))
@@ -156,18 +162,19 @@ class _ShiftMixture(nn.Module):
 
     movable: Tensor  # (M,) ids of their classes
 
-    def __init__(self, width: int, reach: int) -> None:
+    def __init__(self, width: int, reach: int, classes: ClassSet) -> None:
         super().__init__()
         self._reach, side = reach, 2 * reach + 1
+        self._classes, movable = classes.count, classes.movable
         self.choose = nn.Conv2d(width, side * side, 1)
-        self.gate = nn.Conv2d(width, len(MOVABLE), 1)
-        self.gain = nn.Parameter(torch.full((len(MOVABLE), 1, 1), 3.0))
+        self.gate = nn.Conv2d(width, len(movable), 1)
+        self.gain = nn.Parameter(torch.full((len(movable), 1, 1), 3.0))
         nn.init.zeros_(self.choose.weight)
         stay = torch.zeros(side * side)
         stay[side * side // 2] = _STAY
         self.choose.bias = nn.Parameter(stay)
         nn.init.constant_(torch.as_tensor(self.gate.bias), _SHUT)
-        self.register_buffer("movable", torch.tensor(MOVABLE), persistent=False)
+        self.register_buffer("movable", torch.tensor(movable, dtype=torch.int64), persistent=False)
 
     def forward(self, features: Tensor, planes: Tensor, sensors: int) -> Tensor:
         """Return what is added to the logits: (B, C, H, W).
@@ -178,7 +185,7 @@ class _ShiftMixture(nn.Module):
             sensors: S.
         """
         batch, _, rows, columns = planes.shape
-        newest = planes.view(batch, sensors, -1, CLASS_COUNT, rows, columns)[:, :, -1].amax(dim=1)
+        newest = planes.view(batch, sensors, -1, self._classes, rows, columns)[:, :, -1].amax(dim=1)
         newest = newest.index_select(1, self.movable)
         folded = F.pixel_unshuffle(newest, FOLD)  # (B, 4 M, H / 2, W / 2), M classes that move
         seen = F.unfold(folded, 2 * self._reach + 1, padding=self._reach)
@@ -187,5 +194,5 @@ class _ShiftMixture(nn.Module):
         moved = F.pixel_shuffle((seen * weights[:, None]).sum(dim=2), FOLD)
         gate = F.interpolate(self.gate(features).sigmoid(), scale_factor=FOLD, mode="nearest")
         change = gate * self.gain * (moved - newest)
-        added = change.new_zeros(batch, CLASS_COUNT, rows, columns)
+        added = change.new_zeros(batch, self._classes, rows, columns)
         return added.index_copy(1, self.movable, change)

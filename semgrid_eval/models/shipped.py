@@ -6,6 +6,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from semgrid_eval.classes import DEFAULT_CLASSES
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.models.checkpoint import load_weights, read_header
@@ -37,10 +38,16 @@ class TownResidual(Model, torch.nn.Module):
 
     @classmethod
     def check(cls, settings: Config, given: Given) -> None:
-        """Refuse what it was not trained on: one sensor, two inputs moved to the target's time, the paper's cells."""
+        """Refuse what it was not trained on.
+
+        That is one sensor, two inputs moved to the target's time, and the paper's cells and classes.
+        """
         if given.grids != _INPUTS or given.inputs != _INPUTS:
             asked = f"{len(given.sensors)} sensors and {given.inputs} inputs"
             raise ConfigError(f"was trained on {_INPUTS} inputs of one sensor, not {asked}", field="model")
+        if given.classes != DEFAULT_CLASSES:
+            names = ", ".join(given.classes.names)
+            raise ConfigError(f"was trained on the default classes, and grid.classes has {names}", field="model")
         if not given.translate:
             raise ConfigError(
                 "was trained on inputs moved to the target's time, which translate: false leaves out", field="model"

@@ -1,6 +1,7 @@
 """Stand-ins for models of one's own: they have their facts and settings, while their code runs in a process apart."""
 
 import importlib
+import math
 from dataclasses import is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -9,7 +10,6 @@ import torch
 from pydantic import ConfigDict
 from torch import Tensor
 
-from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError
 from semgrid_eval.models.beside import Code
@@ -76,8 +76,8 @@ class StandIn(Model):
     def predict(self, batch: WindowBatch) -> Tensor:
         """Score a batch in the process apart: (B, C, H, W) on the batch's device."""
         count, rows, columns = batch.target.shape
-        shape = (count, CLASS_COUNT, rows, columns)
-        limit_bytes = 8 * count * CLASS_COUNT * rows * columns
+        shape = (count, self.given.classes.count, rows, columns)
+        limit_bytes = 8 * math.prod(shape)
         found, content = self.host.ask("predict", limit_bytes=limit_bytes, batch=batch_on(batch, torch.device("cpu")))
         kind = str(found["type"]) if isinstance(found, dict) else ""
         if limit_bytes // 8 * _FLOATS.get(kind, 0) != len(content):

@@ -3,12 +3,12 @@
 import torch
 from torch import Tensor
 
-from semgrid_eval.classes import CLASS_COUNT
 from semgrid_eval.models.model import Baseline
 from semgrid_eval.models.overlay import newest_first
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
-GRID_LIMIT = 5  # grids that a table looks at, the newest ones: it has 10 to the power of their number rows
+GRID_LIMIT = 5  # grids that a table looks at, the newest ones: it has C to the power of their number rows
+SIZE_LIMIT = 10**6  # of its counts, one for each row and class of the target; of many classes it looks at fewer grids
 SMOOTHING_CELLS = 50.0  # how many cells of what fewer grids suggest are added to the counts of each row
 BATCH = 64  # windows that are counted at once
 
@@ -21,29 +21,33 @@ class ClassTable(Baseline):
 
     @property
     def _grids(self) -> int:
-        return min(self.given.grids, GRID_LIMIT)
+        fitting = (grids for grids in range(1, GRID_LIMIT + 1) if self._classes ** (grids + 1) <= SIZE_LIMIT)
+        return min(self.given.grids, max(fitting))
+
+    @property
+    def _classes(self) -> int:
+        return self.given.classes.count
 
     def fit(self, windows: WindowSet) -> None:
         """Count the target's classes over all cells outside M of training windows."""
-        size = CLASS_COUNT ** (self._grids + 1)
+        size = self._classes ** (self._grids + 1)
         counts = torch.zeros(size, dtype=torch.int64)
         for part in windows.batches(BATCH):
-            index = _rows(part, self._grids) * CLASS_COUNT + part.target
+            index = self._rows(part) * self._classes + part.target
             counts += torch.bincount(index[~part.mask], minlength=size).cpu()
-        self._probability = _smoothed(counts.view([CLASS_COUNT] * (self._grids + 1)).double()).float()
+        self._probability = _smoothed(counts.view([self._classes] * (self._grids + 1)).double()).float()
 
     def predict(self, batch: WindowBatch) -> Tensor:
         """Look every cell up: (B, C, H, W)."""
         table = self._probability.to(batch.past.device)
-        return table[_rows(batch, self._grids)].permute(0, 3, 1, 2)
+        return table[self._rows(batch)].permute(0, 3, 1, 2)
 
-
-def _rows(batch: WindowBatch, grids: int) -> Tensor:
-    """Number the classes of the newest grids, newest first and sensors in order: (B, H, W) int64."""
-    rows = torch.zeros_like(batch.target, dtype=torch.int64)
-    for grid in newest_first(batch)[:, :grids].unbind(dim=1):
-        rows = rows * CLASS_COUNT + grid
-    return rows
+    def _rows(self, batch: WindowBatch) -> Tensor:
+        """Number the classes of the newest grids, newest first and sensors in order: (B, H, W) int64."""
+        rows = torch.zeros_like(batch.target, dtype=torch.int64)
+        for grid in newest_first(batch)[:, : self._grids].unbind(dim=1):
+            rows = rows * self._classes + grid
+        return rows
 
 
 def _smoothed(counts: Tensor) -> Tensor:
@@ -54,8 +58,8 @@ def _smoothed(counts: Tensor) -> Tensor:
     marginals = [counts]
     while marginals[-1].ndim > 1:
         marginals.append(marginals[-1].sum(dim=-2))
-    prior = torch.tensor(1 / CLASS_COUNT, dtype=counts.dtype)
+    prior = torch.tensor(1 / counts.shape[-1], dtype=counts.dtype)
     for seen in reversed(marginals):
         cells = seen.sum(dim=-1, keepdim=True) + SMOOTHING_CELLS
         prior = ((seen + SMOOTHING_CELLS * prior) / cells).unsqueeze(-2)
-    return prior.reshape(-1, CLASS_COUNT)
+    return prior.reshape(-1, counts.shape[-1])

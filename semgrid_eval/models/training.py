@@ -4,7 +4,7 @@ import hashlib
 import math
 import time
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -58,7 +58,7 @@ def train(
     network.to(device)
     key = {
         "network": [type(network).__name__, network.version, network.settings.model_dump(mode="json")],
-        "given": asdict(network.given),
+        "given": network.given.described(),
         "seed": seed,
         "windows": windows.digest(),
         "validation": validation.digest() if validation else None,

@@ -42,4 +42,4 @@ class FuseTrueMotion(Model):
         stays = shift_grids(left, batch.shift_cells[:, None]) == 0
         bare = torch.where(stays, batch.past, UNKNOWN)
         moved = torch.where(arrived == UNKNOWN, bare, arrived)
-        return one_hot(overlay(newest_first(replace(batch, past=moved))))
+        return one_hot(overlay(newest_first(replace(batch, past=moved))), self.given.classes.count)

@@ -98,11 +98,12 @@ class Again:
 
 def _every_window(recording: GridRecording, row: Row) -> WindowSet:
     """Select the windows of every target that a recording has."""
-    data = stack_recordings([recording], cell_m=row.grid.spec.cell_m, sensors=row.sensors)
+    grid = row.grid
+    data = stack_recordings([recording], cell_m=grid.spec.cell_m, classes=grid.classes, sensors=row.sensors)
     config = row.scored_window.model_copy(update={"target_frame": None})
     planned = validation_windows(data.frame_counts, config, wanted_lead(config, data))
     windows = select_windows(data, planned.windows, sensors=row.sensors, translate=row.translate)
-    return windows.disturbed(row.disturb, row.grid.spec)
+    return windows.disturbed(row.disturb, grid.spec)
 
 
 def _predicted(windows: WindowSet, chosen: slice, model: Model) -> Iterator[tuple[Grid, ...]]:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_folder
 from semgrid_eval.grids.extent import extent_of
@@ -17,7 +18,12 @@ _NS_PER_MS = 1_000_000
 
 
 def write_predictions(
-    path: Path | str, predictions: Iterable[Prediction], *, recording: str, spec: GridSpec | None = None
+    path: Path | str,
+    predictions: Iterable[Prediction],
+    *,
+    recording: str,
+    spec: GridSpec | None = None,
+    classes: ClassSet = DEFAULT_CLASSES,
 ) -> int:
     """Write what a model of one's own predicted as a log for rows of `model: log`, and return how many there were.
 
@@ -26,11 +32,12 @@ def write_predictions(
         predictions: in the order of their publication; they are written as they come.
         recording: name of the recording, as `build_grids` and results have it.
         spec: extent of the grids.
+        classes: of their cells.
 
     Raises:
         InputError: there is none, or one is of another size, has ids that are not classes or times that cannot be.
     """
-    return logs.write_predictions(Path(path), predictions, recording, extent_of(spec or GridSpec()))
+    return logs.write_predictions(Path(path), predictions, recording, extent_of(spec or GridSpec(), classes))
 
 
 def export_predictions(run: Path | str, row: str, out: Path | str, *, latency_ms: float = 0.0) -> list[Path]:
@@ -52,10 +59,11 @@ def export_predictions(run: Path | str, row: str, out: Path | str, *, latency_ms
         raise InputError("exists and is not an empty folder", path=out)
     scored = read_scored(run, find_row(results.read_run(run), row, run))
     took_ns, names = round(latency_ms * _NS_PER_MS), list(scored.windows_of)
+    extent = extent_of(scored.grid.spec, scored.grid.classes)
     with atomic_folder(out) as partial:
         for name in names:
             found = _predictions(scored, name, took_ns)
-            write_predictions(partial / f"{name}{SUFFIX}", found, recording=name, spec=scored.grid.spec)
+            logs.write_predictions(partial / f"{name}{SUFFIX}", found, name, extent)
     return [out / f"{name}{SUFFIX}" for name in names]
 
 

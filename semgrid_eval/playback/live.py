@@ -10,17 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.config import parse_config
+from semgrid_eval.grids.extent import place_of
 from semgrid_eval.log import topics
 from semgrid_eval.log.codec import transforms_message
-from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK
+from semgrid_eval.log.grids import CERTAINTY, MASK, class_layer
 from semgrid_eval.log.predictions import Prediction
 from semgrid_eval.playback.backdrop import Backdrop
-from semgrid_eval.playback.outgoing import GridTopic, Outgoing, opening, place_of
+from semgrid_eval.playback.outgoing import GridTopic, Outgoing, opening
 from semgrid_eval.playback.scored import Scored
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.streams.config import StreamConfig
-
-_TARGET = GridTopic(topics.GRID_TARGET, CLASSES, {})
 
 
 class PlayedStreams:
@@ -38,7 +37,7 @@ class PlayedStreams:
     def messages(self, shift_ns: int) -> Iterator[Outgoing]:
         """Iterate over all messages in the order of time, all times shifted."""
         names = tuple(stream.name for stream in self._streams)
-        first = opening(self.first_ns + shift_ns, names, self._first.grid.spec)
+        first = opening(self.first_ns + shift_ns, names, self._first.grid)
         answers = (stream.answers(shift_ns) for stream in self._streams)
         parts = (first, self._around(shift_ns), self._truth(shift_ns), *answers)
         return heapq.merge(*parts, key=lambda sent: sent.log_ns)
@@ -54,13 +53,14 @@ class PlayedStreams:
 
     def _truth(self, shift_ns: int) -> Iterator[Outgoing]:
         arrays, place = self._first.arrays, place_of(self._first.grid.spec)
+        shown = GridTopic(topics.GRID_TARGET, class_layer(self._first.grid.classes), {})
         left_out = GridTopic(f"{topics.GRID_MASK}/1", MASK, {"row": self._first.row.name})
         for evaluated_ns, target, mask in zip(*(arrays[each] for each in _TRUTH), strict=True):
             now_ns = int(evaluated_ns) + shift_ns
-            for topic, values in ((_TARGET, target), (left_out, mask)):
+            for topic, values in ((shown, target), (left_out, mask)):
                 yield topic.shown(now_ns, now_ns, values, place)
                 yield topic.exact(now_ns, now_ns, values, place)
-            yield _TARGET.picture(now_ns, now_ns, target, mask)
+            yield shown.picture(now_ns, now_ns, target, mask)
 
 
 _TRUTH = ("evaluated_ns", "target", "mask")
@@ -80,7 +80,7 @@ class _Stream:
         self._how = parse_config(StreamConfig, scored.record.config.get("stream"))
         self._place, self._is_unsure = place_of(scored.grid.spec), scored.is_unsure
         notes = {"row": self.name}
-        self._answer = GridTopic(f"{topics.GRID_PREDICTION}/{number}", CLASSES, notes)
+        self._answer = GridTopic(f"{topics.GRID_PREDICTION}/{number}", class_layer(scored.grid.classes), notes)
         self._certainty = GridTopic(f"{topics.GRID_CERTAINTY}/{number}", CERTAINTY, notes)
 
     def answers(self, shift_ns: int) -> Iterator[Outgoing]:

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 from google.protobuf.message import Message
 
-from semgrid_eval.grids.extent import extent_of
-from semgrid_eval.grids.spec import GridSpec
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.grids import GridLayer, GridPlace, exact_message, viewer_message
 from semgrid_eval.log.predictions import Prediction, prediction_message
 from semgrid_eval.log.topics import GRID_LEGEND, GRID_PREDICTION
@@ -49,17 +48,14 @@ class GridTopic:
 
     def prediction(self, prediction: Prediction, place: GridPlace, now_ns: int) -> Outgoing:
         """Write the ids of a prediction, with its certainty if it has one and the times that it tells."""
-        message = prediction_message(prediction, place)
+        message = prediction_message(prediction, self.layer, place)
         return Outgoing(now_ns, f"{self.topic}/exact", message, prediction.publish_ns, self.notes)
 
 
-def opening(now_ns: int, rows: tuple[str, ...], spec: GridSpec) -> Iterator[Outgoing]:
+def opening(now_ns: int, rows: tuple[str, ...], grid: GridConfig) -> Iterator[Outgoing]:
     """Write what is said once: the legend, and the name of each row beside its prediction."""
-    yield Outgoing(now_ns, GRID_LEGEND, legend(now_ns, rows))
+    yield Outgoing(now_ns, GRID_LEGEND, legend(now_ns, rows, grid.classes))
     for number, name in enumerate(rows, start=1):
-        yield Outgoing(now_ns, f"{GRID_PREDICTION}/{number}/name", row_name(now_ns, name, spec), notes={"row": name})
-
-
-def place_of(spec: GridSpec) -> GridPlace:
-    """Return where grids lie."""
-    return extent_of(spec).place
+        yield Outgoing(
+            now_ns, f"{GRID_PREDICTION}/{number}/name", row_name(now_ns, name, grid.spec), notes={"row": name}
+        )

@@ -16,7 +16,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, MASK_COLOUR, class_palette
+from semgrid_eval.classes import MASK_COLOUR, ClassSet
 from semgrid_eval.errors import printable
 from semgrid_eval.grids.spec import GridSpec
 from semgrid_eval.log.codec import timestamp
@@ -25,7 +25,6 @@ from semgrid_eval.log.topics import GRID_FRAME
 from semgrid_eval.recording.png import encode_gray, with_palette
 
 Grid = NDArray[np.uint8]
-_MASKED = CLASS_COUNT
 _LINE_PX, _SWATCH_PX, _TEXT_PX, _EDGE_PX = 26, 18, 16, 10
 _TEXT_M = 4.0  # height of a row's name beside its grid
 _WIDTH_OF_LETTER = 0.6  # of its height
@@ -36,16 +35,17 @@ def grid_picture(stamp_ns: int, values: Grid, layer: GridLayer, mask: Grid | Non
     """Draw a grid (H, W), row 0 at the upper edge, in the colours of its layer, and the mask M in white."""
     palette = layer.rgba[:, :3].copy()
     if mask is not None:
-        palette[_MASKED] = MASK_COLOUR
-        values = np.where(mask, np.uint8(_MASKED), values)
+        masked = len(layer.names)  # the id after those of all classes
+        palette[masked] = MASK_COLOUR
+        values = np.where(mask, np.uint8(masked), values)
     return _picture(stamp_ns, with_palette(encode_gray(values), palette))
 
 
-def legend(stamp_ns: int, rows: Sequence[str]) -> CompressedImage:
+def legend(stamp_ns: int, rows: Sequence[str], classes: ClassSet) -> CompressedImage:
     """Draw which colour is which class, and which number is which row."""
-    classes = [(name.replace("_", " "), tuple(each)) for name, each in zip(CLASS_NAMES, class_palette(), strict=True)]
+    named = [(entry.name.replace("_", " "), entry.colour) for entry in classes.classes]
     numbered = [(f"{number}: {_drawable(row)}", _BACKGROUND) for number, row in enumerate(rows, start=1)]
-    lines = [*classes, ("left out of scores (M)", MASK_COLOUR), *numbered]
+    lines = [*named, ("left out of scores (M)", MASK_COLOUR), *numbered]
     font = ImageFont.load_default(_TEXT_PX)
     left_px = 2 * _EDGE_PX + _SWATCH_PX
     width_px = left_px + _EDGE_PX + math.ceil(max(font.getlength(text) for text, _ in lines))

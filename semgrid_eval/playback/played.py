@@ -4,16 +4,15 @@ import heapq
 from collections.abc import Iterator, Sequence
 from itertools import chain
 
+from semgrid_eval.grids.extent import place_of
 from semgrid_eval.log import topics
 from semgrid_eval.log.codec import transforms_message
-from semgrid_eval.log.grids import CERTAINTY, CLASSES, MASK
+from semgrid_eval.log.grids import CERTAINTY, MASK, class_layer
 from semgrid_eval.log.predictions import Prediction
 from semgrid_eval.playback.backdrop import Backdrop
-from semgrid_eval.playback.outgoing import GridTopic, Outgoing, opening, place_of
+from semgrid_eval.playback.outgoing import GridTopic, Outgoing, opening
 from semgrid_eval.playback.windows import Frame, RowWindows
 from semgrid_eval.recording.types import Pose
-
-_TARGET = GridTopic(topics.GRID_TARGET, CLASSES, {})
 
 
 class PlayedWindows:
@@ -24,14 +23,15 @@ class PlayedWindows:
 
     def __init__(self, rows: Sequence[RowWindows], backdrop: Backdrop | None) -> None:
         self._rows, self._backdrop = rows, backdrop
-        self._place = place_of(rows[0].scored.grid.spec)
+        self._place, self._layer = place_of(rows[0].scored.grid.spec), class_layer(rows[0].scored.grid.classes)
+        self._measured = GridTopic(topics.GRID_TARGET, self._layer, {})
         self._stamps_ns = sorted({window.target_stamp_ns for row in rows for window in row.windows})
         self.first_ns, self.last_ns = self._stamps_ns[0], self._stamps_ns[-1]
 
     def messages(self, shift_ns: int) -> Iterator[Outgoing]:
         """Iterate over all messages in the order of time, all times shifted."""
         names = tuple(row.scored.row.name for row in self._rows)
-        first = opening(self.first_ns + shift_ns, names, self._rows[0].scored.grid.spec)
+        first = opening(self.first_ns + shift_ns, names, self._rows[0].scored.grid)
         return heapq.merge(first, self._around(shift_ns), self._grids(shift_ns), key=lambda sent: sent.log_ns)
 
     def _around(self, shift_ns: int) -> Iterator[Outgoing]:
@@ -57,15 +57,16 @@ class PlayedWindows:
 
     def _target(self, frame: Frame, shift_ns: int) -> Iterator[Outgoing]:
         now_ns = frame.window.target_stamp_ns + shift_ns
-        yield _TARGET.shown(now_ns, now_ns, frame.target, self._place)
-        yield _TARGET.exact(now_ns, now_ns, frame.target, self._place)
-        yield _TARGET.picture(now_ns, now_ns, frame.target, frame.mask)
+        yield self._measured.shown(now_ns, now_ns, frame.target, self._place)
+        yield self._measured.exact(now_ns, now_ns, frame.target, self._place)
+        yield self._measured.picture(now_ns, now_ns, frame.target, frame.mask)
 
     def _row(self, number: int, row: RowWindows, frame: Frame, shift_ns: int) -> Iterator[Outgoing]:
         """Write M, which depends on what a row has seen, prediction and certainty."""
         times_ns = (frame.window.target_stamp_ns + shift_ns, frame.window.input_stamps_ns[-1] + shift_ns)
         notes, unsure = {"row": row.scored.row.name}, row.scored.is_unsure
-        mask, answer = (GridTopic(f"{topic}/{number}", layer, notes) for topic, layer in _OF_A_ROW)
+        mask = GridTopic(f"{topics.GRID_MASK}/{number}", MASK, notes)
+        answer = GridTopic(f"{topics.GRID_PREDICTION}/{number}", self._layer, notes)
         yield mask.shown(times_ns[0], times_ns[0], frame.mask, self._place)
         yield mask.exact(times_ns[0], times_ns[0], frame.mask, self._place)
         yield answer.shown(*times_ns, frame.prediction, self._place)
@@ -85,14 +86,11 @@ class PlayedWindows:
             newest_first = zip(past[::-1], frame.window.input_stamps_ns[::-1], strict=True)
             for back, (values, stamp_ns) in enumerate(newest_first):
                 topic = f"{topics.GRID_INPUT}/{number}/{place}" + (f"/before_{back}" if back else "")
-                seen = GridTopic(topic, CLASSES, notes)
+                seen = GridTopic(topic, self._layer, notes)
                 yield seen.shown(now_ns, stamp_ns + shift_ns, values, self._place)
                 yield seen.exact(now_ns, stamp_ns + shift_ns, values, self._place)
                 if not back:
                     yield seen.picture(now_ns, stamp_ns + shift_ns, values)
-
-
-_OF_A_ROW = ((topics.GRID_MASK, MASK), (topics.GRID_PREDICTION, CLASSES))
 
 
 def _numbered(number: int, row: RowWindows) -> Iterator[tuple[int, RowWindows, Frame]]:

@@ -94,7 +94,7 @@ class RunData:
             if not chosen:
                 raise InputError(self._why_none(data_set, split))
             sensors = list(dict.fromkeys(self._sensors[key[0]]))
-            stacked = stack_recordings(chosen, cell_m=config.spec.cell_m, sensors=sensors)
+            stacked = stack_recordings(chosen, cell_m=config.spec.cell_m, classes=config.classes, sensors=sensors)
             self._stacked[key] = stacked.to(self._device)
             # They have their copy now.
             data_set.recordings = [recording for recording in data_set.recordings if recording.split != split]

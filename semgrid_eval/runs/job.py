@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.config import Config
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
@@ -61,7 +60,7 @@ class Job:
 
 def id_of_windows(row: Row, scored: WindowSet) -> str:
     """Digest what decides the windows that a run keeps."""
-    return digest_value([SCORING_VERSION, GRIDS, scored.digest(), grid_digest(row.grid), list(CLASS_NAMES)])
+    return digest_value([SCORING_VERSION, GRIDS, scored.digest(), grid_digest(row.grid), list(row.grid.classes.names)])
 
 
 def id_of_result(config: Mapping[str, object], windows_id: str, training_id: str | None, seed: int | None) -> str:
@@ -81,7 +80,7 @@ def target_key(job: Job) -> str:
     targets = sorted(zip(digests, data.stamps_ns[frames].tolist(), places.tolist(), strict=True))
     kind = ["stream"] if job.stream else []
     return digest_value(
-        [targets, row.grid.target_identity(), row.mask_mode, row.scored_split, list(CLASS_NAMES), *kind]
+        [targets, row.grid.target_identity(), row.mask_mode, row.scored_split, list(row.grid.classes.names), *kind]
     )
 
 

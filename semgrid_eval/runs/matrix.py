@@ -11,6 +11,7 @@ from typing import Any
 
 from pydantic import Field
 
+from semgrid_eval.class_files import with_classes
 from semgrid_eval.config import Config, load_yaml, merged, parse_config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.faults import meant, not_one_of, shown
@@ -90,7 +91,7 @@ def _require_model(name: str) -> None:
 def _read(name: str, *above: Path) -> tuple[_MatrixFile, Path]:
     """Read a preset or a file with all that it extends; `above` are the files that extend it, the nearest last."""
     path, value = _load(name, *above)
-    file = parse_config(_MatrixFile, value, path=path)
+    file = _with_class_sets(parse_config(_MatrixFile, value, path=path), path)
     if file.extends is None:
         if file.without:
             raise ConfigError("names rows of a base, and there is no `extends`", path=path, field="without")
@@ -100,6 +101,21 @@ def _read(name: str, *above: Path) -> tuple[_MatrixFile, Path]:
     base, base_path = _read(file.extends, *above, path)
     _resolve(base, base_path)  # a fault of the base is named as such
     return _extended(base, file, path), path
+
+
+def _with_class_sets(file: _MatrixFile, path: Path) -> _MatrixFile:
+    """Read the class sets that a file names, by paths relative to it."""
+    rows = [_with_class_set(row, path, f"{_place(row, count)}: grid.classes") for count, row in enumerate(file.rows, 1)]
+    defaults = _with_class_set(file.defaults, path, "defaults.grid.classes")
+    return file.model_copy(update={"rows": rows, "defaults": defaults})
+
+
+def _with_class_set(row: dict[str, Any], path: Path, field: str) -> dict[str, Any]:
+    return row | {"grid": with_classes(row["grid"], path, field)} if "grid" in row else row
+
+
+def _place(row: dict[str, Any], count: int) -> str:
+    return f"row {row['name']!r}" if row.get("name") else f"row number {count}"
 
 
 def _load(name: str, *above: Path) -> tuple[Path, object]:
@@ -151,6 +167,10 @@ def _resolve(file: _MatrixFile, path: Path) -> Matrix:
     name, count = Counter(row.name for row in rows).most_common(1)[0]
     if count > 1:
         raise ConfigError(f"{name!r} is the name of {count} rows", path=path, field="rows.name")
+    first = rows[0]
+    if other := next((row for row in rows if row.grid.classes != first.grid.classes), None):
+        fault = f"rows {first.name!r} and {other.name!r} have different ones; all rows of a matrix have the same"
+        raise ConfigError(fault, path=path, field="grid.classes")
     return Matrix(title=file.title or path.stem, seed=file.seed or 0, rows=tuple(rows))
 
 
@@ -167,7 +187,7 @@ def _expanded(file: _MatrixFile, path: Path) -> Iterator[tuple[str, dict[str, An
     """Merge defaults into each row, multiply it by its axes, and put its model's settings under its own."""
     number = 0
     for count, row in enumerate(file.rows, start=1):
-        place = f"row {row['name']!r}" if row.get("name") else f"row number {count}"
+        place = _place(row, count)
         whole = merged(file.defaults, row)
         axes = parse_config(_WithAxes, {"axes": whole.pop("axes", {})}, path=f"{path}: {place}").axes
         number += math.prod(len(values) for values in axes.grid.values()) * max(map(len, axes.zip.values()), default=1)

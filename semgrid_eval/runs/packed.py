@@ -89,7 +89,9 @@ class PackedGrids:
             recordings = [each for log in self._index.logs if log.split == split for each in self._read(log)]
             if not recordings:
                 raise InputError(f"holds no recording of split {split!r}", path=self._folder)
-            stacked = stack_recordings(recordings, cell_m=config.spec.cell_m, sensors=self._sensors)
+            stacked = stack_recordings(
+                recordings, cell_m=config.spec.cell_m, classes=config.classes, sensors=self._sensors
+            )
             self._stacked[split] = stacked.to(self._device)
         return self._stacked[split]
 

@@ -3,7 +3,7 @@
 import tempfile
 import time
 from collections import defaultdict
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -163,7 +163,9 @@ class _Speed:
         """Estimate the rest of a training with its validation after each epoch."""
         sample = settings.model_copy(update={"training": settings.training.model_copy(update=SAMPLE)})
         resolved = job.resolved
-        build = digest_value([job.row.model, resolved.version, sample.model_dump(mode="json"), asdict(job.row.given)])
+        build = digest_value(
+            [job.row.model, resolved.version, sample.model_dump(mode="json"), job.row.given.described()]
+        )
         if build not in self._seconds:
             self._seconds[build] = self._measure(job, sample)
         config, watched = settings.training, job.training and job.training.watched

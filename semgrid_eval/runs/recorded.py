@@ -13,8 +13,7 @@ from torch import Tensor
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.extent import extent_of
-from semgrid_eval.grids.spec import GridSpec
-from semgrid_eval.log.predictions import PredictionLog
+from semgrid_eval.log.predictions import GridExtent, PredictionLog
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.models.model import AnswersIn
 from semgrid_eval.runs.row import Row
@@ -38,8 +37,8 @@ class PredictionLogs:
         InputError: the folder holds no log, a log cannot be read, or two belong to one recording.
     """
 
-    def __init__(self, where: AnswersIn, spec: GridSpec) -> None:
-        self.folder, self._topic, self._extent = Path(where.folder), where.topic, extent_of(spec)
+    def __init__(self, where: AnswersIn, extent: GridExtent) -> None:
+        self.folder, self._topic, self._extent = Path(where.folder), where.topic, extent
         self._paths: dict[str, Path] = {}
         self._digests: dict[str, str] = {}
         for path in find_logs(self.folder):
@@ -89,7 +88,7 @@ class PredictionLogs:
         return self._kept[1]
 
     def _read(self, recording: str) -> Grids:
-        count, (rows, columns, _) = len(self.times(recording).for_ns), self._extent
+        count, (rows, columns, *_) = len(self.times(recording).for_ns), self._extent
         path = self.path(recording)
         if count * rows * columns * 2 > _LIMIT_BYTES:
             raise LogError(f"holds {count} predictions, more than {_LIMIT_BYTES >> 30} GiB of them", path=path)
@@ -128,9 +127,9 @@ class RecordedRows:
         """Return the logs with a row's answers; None for rows that answer here."""
         if row.answers_in is None:
             return None
-        key = (row.answers_in, row.grid.spec.model_dump_json())
+        key = (row.answers_in, extent := extent_of(row.grid.spec, row.grid.classes))
         if key not in self._logs:
-            self._logs[key] = PredictionLogs(row.answers_in, row.grid.spec)
+            self._logs[key] = PredictionLogs(row.answers_in, extent)
         return self._logs[key]
 
     def identity(self, row: Row, scored: WindowSet) -> dict[str, object]:

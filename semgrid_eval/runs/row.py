@@ -153,7 +153,8 @@ class Row(Config):
     def given(self) -> Given:
         """What the row gives its model."""
         spec = self.grid.spec
-        return Given(self.sensors, self.window.inputs, spec.rows, spec.columns, spec.cell_m, self.translate)
+        size = (spec.rows, spec.columns, spec.cell_m)
+        return Given(self.sensors, self.window.inputs, *size, self.translate, self.grid.classes)
 
     def found_model(self) -> type[Model] | None:
         """Return the class of the row's model, None where its code cannot be loaded."""

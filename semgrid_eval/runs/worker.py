@@ -11,7 +11,6 @@ import numpy as np
 import torch
 
 from semgrid_eval.arrays import write_arrays
-from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, ResultError
 from semgrid_eval.files import atomic_folder, digest_value
 from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
@@ -218,7 +217,7 @@ class Worker:
                 "threads": self.threads if self.device.type == "cpu" else None,
                 "seed": seed,
                 "windows": [windows.digest(), watched.digest() if watched else None],
-                "grids": [GRIDS, grid_digest(row.grid), list(CLASS_NAMES)],
+                "grids": [GRIDS, grid_digest(row.grid), list(row.grid.classes.names)],
             }
         )
         return Training(training_id, self.trainings / training_id, windows, watched)

@@ -81,6 +81,7 @@ def evaluate(
             inputs=inputs,
             actors=actors,
             spec=spec,
+            classes=windows.data.classes,
         )
         counted = replace(answer, sums=count_windows(scored))
         if expected is not None:
@@ -121,11 +122,11 @@ def answered(model: Model, seen: WindowBatch) -> Evaluation:
         torch.cuda.synchronize(seen.target.device)
     start_s = time.perf_counter()
     with torch.inference_mode():
-        scores = require_answer(model.predict(_without_answer(seen)), seen, model.called)
+        scores = require_answer(model.predict(_without_answer(seen)), seen, model)
         certainty, prediction = scores.max(dim=1)
         answer = prediction.to(torch.uint8).cpu().numpy()
     seconds = time.perf_counter() - start_s
-    require_scores(scores, seen, model.called)
+    require_scores(scores, seen, model)
     levels = (certainty.float().clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy()
     return Evaluation({}, answer, levels, seconds)
 

@@ -35,25 +35,23 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from semgrid_eval.arrays import read_arrays, write_arrays
+from semgrid_eval.class_files import classes_of_grid
+from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError, ResultError, first_line
 from semgrid_eval.scores.facts import RowFacts, StreamRecord
-from semgrid_eval.scores.metrics.table import METRICS, Sums
+from semgrid_eval.scores.metrics.table import METRICS, Sums, metrics_of
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.seals import read_sealed, read_sealed_json, write_sealed_json
 
 FORMAT_VERSION = 2
 RUN_FILE, RESULT_FILE = "run.json", "result.json"
-SUMS_FILE = "sums.npz"
-EXPECTED_FILE = "expected.npz"
-PREDICTIONS_FILE = "predictions.npz"
-STREAM_FILE = "stream.npz"
+SUMS_FILE, EXPECTED_FILE = "sums.npz", "expected.npz"
+PREDICTIONS_FILE, STREAM_FILE, HISTORY_FILE = "predictions.npz", "stream.npz", "history.csv"
 _ANSWERS = ("prediction", "certainty", "for_ns", "capture_ns", "publish_ns", "answer_m", "publish_m")
 _EVALUATIONS = ("evaluated_ns", "evaluated_m", "used", "target", "mask")
-HISTORY_FILE = "history.csv"
 _RUN = "run"  # owns the record of a run, which has no id
-NOT_RUN = "not run yet"
-"""What the record of a row says whose turn has not come."""
+NOT_RUN = "not run yet"  # what the record of a row says whose turn has not come
 
 
 class LogRecord(Config):
@@ -108,6 +106,11 @@ class ResultRecord(Config):
     parameters: int | None
     stream: StreamRecord | None = None  # then its windows are blocks of time, and the first recording is kept
     has_expected: bool = False  # whether it is also scored against what is measured on average
+
+    @property
+    def classes(self) -> ClassSet:
+        """The classes of its grids; a ConfigError says that what its configuration has is not a class set."""
+        return classes_of_grid(self.config.get("grid"), self.id)
 
 
 class RowRecord(Config):
@@ -189,7 +192,7 @@ def fault_of(folder: Path, *, with_predictions: bool = False, with_history: bool
     """Say why a result is not done; None where it parses, matches its id and has sums and what else is asked for."""
     try:
         record = read_result(folder)
-        check_sums(folder, len(record.windows), has_expected=record.has_expected)
+        check_sums(folder, len(record.windows), record.classes, has_expected=record.has_expected)
         if with_predictions:
             read_stream(folder) if record.stream else read_predictions(folder)
         if with_history and ((history := read_history(folder)) is None or history.empty):
@@ -246,19 +249,25 @@ def write_sums(folder: Path, sums: Sums, result_id: str = "", file: str = SUMS_F
 
 
 def read_sums(
-    folder: Path, metric: str, partition: str, *, file: str = SUMS_FILE, verify: bool = True
+    folder: Path,
+    metric: str,
+    partition: str,
+    classes: ClassSet = DEFAULT_CLASSES,
+    *,
+    file: str = SUMS_FILE,
+    verify: bool = True,
 ) -> NDArray[np.int32] | None:
     """Read what a metric counted by a partition: (N, regions, ...); None where the windows do not tell the regions.
 
-    Who has called `check_sums` before need not `verify` the file each time.
+    `classes` are the result's. Who has called `check_sums` before need not `verify` the file each time.
     """
-    return _read_sums(folder / file, [(metric, partition)], verify=verify).get((metric, partition))
+    return _read_sums(folder / file, [(metric, partition)], classes, verify=verify).get((metric, partition))
 
 
-def check_sums(folder: Path, windows: int, *, has_expected: bool = False) -> None:
+def check_sums(folder: Path, windows: int, classes: ClassSet = DEFAULT_CLASSES, *, has_expected: bool = False) -> None:
     """Read everything that was counted, and forget it; a ResultError says what is missing or malformed."""
     for file in (SUMS_FILE, EXPECTED_FILE) if has_expected else (SUMS_FILE,):
-        for key, found in _read_sums(folder / file, list(product(METRICS, PARTITIONS))).items():
+        for key, found in _read_sums(folder / file, list(product(METRICS, PARTITIONS)), classes).items():
             if len(found) != windows:
                 fault = f"has {len(found)} windows, and result.json {windows}"
                 raise ResultError(fault, path=folder / file, field=".".join(key))
@@ -270,16 +279,16 @@ def _owner_of_sums(result_id: str, file: str) -> str:
 
 
 def _read_sums(
-    path: Path, keys: Sequence[tuple[str, str]], *, verify: bool = True
+    path: Path, keys: Sequence[tuple[str, str]], classes: ClassSet, *, verify: bool = True
 ) -> dict[tuple[str, str], NDArray[np.int32]]:
-    names = {key: ".".join(key) for key in keys}
+    names, metrics = {key: ".".join(key) for key in keys}, metrics_of(classes)
     needed = tuple(name for key, name in names.items() if key[1] == "all")
     optional = tuple(name for name in names.values() if name not in needed)
     owner = _owner_of_sums(path.parent.name, path.name)
     found = read_arrays(path, needed, owner=owner, optional=optional, verify=verify)
     sums = {key: found[name] for key, name in names.items() if name in found}
     for (metric, partition), counted in sums.items():
-        shape = (len(PARTITIONS[partition].regions), *METRICS[metric].shape)
+        shape = (len(PARTITIONS[partition].regions), *metrics[metric].shape)
         if counted.shape[1:] != shape or counted.dtype != np.int32 or counted.min(initial=0) < 0:
             fault = f"has shape {counted.shape}, type {counted.dtype}, or is negative"
             raise ResultError(fault, path=path, field=names[metric, partition])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.scores.metrics.metric import Metric, Partition, column_names
-from semgrid_eval.scores.metrics.table import METRICS
+from semgrid_eval.scores.metrics.table import METRICS, metrics_of
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.results import ResultRecord, read_result, read_run, read_sums, result_folder
 
@@ -80,9 +80,10 @@ def _counted(run: Path, metrics: Sequence[str] | None, partitions: Sequence[str]
         for result_id in row.results:
             folder = result_folder(run, result_id)
             record = read_result(folder)
+            known = metrics_of(record.classes)
             for metric, partition in product(metrics or METRICS, partitions or PARTITIONS):
-                if (sums := read_sums(folder, metric, partition)) is not None:
-                    yield _Counted(row.name, record, METRICS[metric], PARTITIONS[partition], sums)
+                if (sums := read_sums(folder, metric, partition, record.classes)) is not None:
+                    yield _Counted(row.name, record, known[metric], PARTITIONS[partition], sums)
 
 
 def _figures(counted: _Counted) -> pd.DataFrame:

@@ -79,6 +79,7 @@ def evaluate_stream(
             inputs=None,
             actors=data.actors_near(frames),
             spec=spec,
+            classes=data.classes,
         )
         for key, counted in count_windows(scored).items():
             if key not in total:

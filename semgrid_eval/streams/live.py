@@ -167,10 +167,10 @@ class LiveLog:
     def _grid(self, disparity: NDArray[np.uint16], label: Image, yaw_rad: float) -> Cells:
         """Make the grid (H, W) of a frame."""
         pixels = self._projection.points(disparity, label)
-        counts = no_points(GRID.spec)
+        counts = no_points(GRID)
         points = Points(_NAME, 0, pixels.forward_m, pixels.left_m, pixels.class_id)
         add_points(counts, points, SE2(0.0, 0.0, yaw_rad), GRID.spec)
-        return rasterise(counts, GRID.morphology)
+        return rasterise(counts, GRID.classes, GRID.morphology)
 
     def _aligned(self) -> WindowBatch:
         """Move the inputs to where the vehicle will be if it goes on as it was reported last: a batch of one window."""
@@ -190,5 +190,5 @@ class LiveLog:
 def _answer(model: Model, batch: WindowBatch) -> Cells:
     """Predict, and bring the classes (H, W) to where they can be sent from."""
     with torch.inference_mode():
-        scores = require_answer(model.predict(batch), batch, model.called)
+        scores = require_answer(model.predict(batch), batch, model)
         return np.asarray(scores.argmax(dim=1).to(torch.uint8)[0].cpu().numpy())

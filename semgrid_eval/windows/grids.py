@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from semgrid_eval.classes import UNKNOWN
+from semgrid_eval.classes import DEFAULT_CLASSES, UNKNOWN, ClassSet
 from semgrid_eval.errors import InputError
 
 if TYPE_CHECKING:  # building grids needs the log readers; using built ones does not
@@ -39,6 +39,7 @@ class GridData:
     # For each recording (its F, H, W) flags of true actors, None where its log does not hold the truth. They stay on
     # the host: scores are split by them, and nothing is predicted from them.
     actors: tuple[NDArray[np.uint8] | None, ...] = ()
+    classes: ClassSet = DEFAULT_CLASSES  # of the grids' cells
 
     def to(self, device: torch.device) -> "GridData":
         """Return the same data with its grids on another device."""
@@ -90,9 +91,15 @@ class GridData:
 
 
 def stack_recordings(
-    recordings: Sequence["GridRecording"], *, cell_m: float, sensors: Sequence[str] | None = None
+    recordings: Sequence["GridRecording"],
+    *,
+    cell_m: float,
+    classes: ClassSet = DEFAULT_CLASSES,
+    sensors: Sequence[str] | None = None,
 ) -> GridData:
     """Put recordings into one block of memory; `sensors` limits it to those and the target's (default: all).
+
+    Edge of a cell and classes are those of the configuration by which the grids were made.
 
     Raises:
         InputError: there is no recording, or one lacks a sensor or has grids of another size.
@@ -123,6 +130,7 @@ def stack_recordings(
         yaw_rad=np.concatenate([entry.yaw_rad for entry in recordings]),
         cell_m=cell_m,
         actors=tuple(entry.actors for entry in recordings),
+        classes=classes,
     )
 
 

@@ -25,7 +25,7 @@ LINES = sorted(line for line in SHOWN if line.startswith("semgrid-eval ") and "-
 MORE = [ROOT / name for name in ("ARCHITECTURE.md", "CONTRIBUTING.md", "reports/README.md")]
 TAKEN_AS_GIVEN = (
     "SRC PREDICTIONS TREE/pred_sequence LOGS/val RUN logs/val drives/val recordings town runs/first runs/stream "
-    "runs/before runs/after runs/paper/trainings drive labelled runs/drive cityscapes"
+    "runs/before runs/after runs/own runs/paper/trainings drive labelled runs/drive cityscapes"
 )
 
 
@@ -35,7 +35,7 @@ def workplace(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for folder in TAKEN_AS_GIVEN.split():
         Path(folder).mkdir(parents=True)
-    for file in ("logs/val/a.mcap", "network.onnx", "ade.onnx", "recording.yaml", "map.yaml", "m.yaml"):
+    for file in ("logs/val/a.mcap", "network.onnx", "ade.onnx", "recording.yaml", "map.yaml", "m.yaml", "own.yaml"):
         Path(file).touch()
     return tmp_path
 
@@ -59,6 +59,8 @@ def test_matrices_load_and_all_else_is_yaml(workplace, page):
             Path(name).write_text(block)
     for block in blocks("yaml", text):
         assert yaml.safe_load(block)
+        if named := re.match(r"# (\w+\.yaml)\n", block):
+            Path(named[1]).write_text(block)
         if "\nrows:" in f"\n{block}":
             Path("m.yaml").write_text(block)
             assert load_matrix("m.yaml").rows

@@ -5,10 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from support.own_classes import FILE
 from support.towns import small_plans
 from support.toy_world import street
 
-from semgrid_eval.classes import CLASS_COUNT
+from semgrid_eval.classes import ClassSet
+from semgrid_eval.config import parse_config
 from semgrid_eval.errors import UnknownTruthError
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.draws import Draws
@@ -19,6 +22,7 @@ from semgrid_eval.log.store import write_log
 from semgrid_eval.sources.town.rendering import render_recording
 
 CONFIG = GridConfig()
+OWN = GridConfig(classes=parse_config(ClassSet, yaml.safe_load(FILE)))
 TWO_PARTS = GridConfig(target=("split1_upper", "split1_lower"))
 
 
@@ -39,7 +43,7 @@ def times(recording, *windows) -> WindowTimes:
     return WindowTimes(np.repeat(stamps_ns[:1], len(windows)), stamps_ns[frames[:, :-1]], stamps_ns[frames[:, -1]])
 
 
-@pytest.mark.parametrize("config", [CONFIG, TWO_PARTS, GridConfig(morphology="off", integrator="arc")])
+@pytest.mark.parametrize("config", [CONFIG, TWO_PARTS, GridConfig(morphology="off", integrator="arc"), OWN])
 @pytest.mark.parametrize("continued", [True, False])
 def test_without_errors_all_draws_are_the_measured_grid(logs, config, continued):
     recording = build_log(logs["exact"], config)[0]
@@ -48,7 +52,7 @@ def test_without_errors_all_draws_are_the_measured_grid(logs, config, continued)
         votes = Draws(3, continued).find(log, config, asked)
     measured = recording.grids[recording.sensors.index(recording.target), [15, 29]]
     assert len(np.unique(measured)) > 2
-    np.testing.assert_array_equal(votes, 3 * (measured[:, None] == np.arange(CLASS_COUNT)[:, None, None]))
+    np.testing.assert_array_equal(votes, 3 * (measured[:, None] == np.arange(config.classes.count)[:, None, None]))
 
 
 def test_each_draw_votes_once_in_every_cell_and_draws_differ(logs):

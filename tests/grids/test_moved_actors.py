@@ -1,12 +1,17 @@
 """Actors that inputs show, moved: against the true boxes at the input's and at the target's time."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import yaml
 from support.drawn_again import write_town_like
+from support.own_classes import FILE
 from support.towns import small_plans
 from support.toy_world import street
 
-from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.classes import CLASS_NAMES, ClassSet
+from semgrid_eval.config import parse_config
 from semgrid_eval.errors import UnknownTruthError
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.moved_actors import MovedActors
@@ -59,6 +64,20 @@ def test_whoever_arrives_lies_where_moving_actors_truly_are(seen):
     assert there.any()
     assert set(np.unique(arrived)) <= {0, *np.flatnonzero(~np.isin(np.arange(10), STATIC))}
     assert (recording.actors[TARGET][there] & MOVING).astype(bool).mean() > 0.9
+
+
+def test_of_own_classes_those_that_move_are_moved(seen):
+    recording, usual, _ = seen
+    config = GridConfig(classes=parse_config(ClassSet, yaml.safe_load(FILE)))
+    path, stamps_ns, movable = Path(recording.log), recording.stamps_ns, config.classes.movable
+    asked = WindowTimes(stamps_ns[:1], stamps_ns[[[INPUT]]], stamps_ns[[TARGET]])
+    with LogReader(path) as log:
+        left, arrived = MovedActors(("full",)).find(log, config, asked)[0, 0, 0]
+    grid = build_log(path, config)[0].grids[0, INPUT]
+    assert left.any()
+    assert set(np.unique(grid[left > 0])) <= set(movable)
+    assert set(np.unique(arrived)) <= {0, *movable}
+    assert ((left > 0) == (usual[0] > 0)).mean() > 0.99
 
 
 def test_a_log_that_does_not_tell_whom_pixels_show_says_so(tmp_path):

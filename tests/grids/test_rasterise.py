@@ -8,14 +8,15 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from support.cameras import calibration
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, CLASSES, NO_POINT
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, DEFAULT_CLASSES, NO_POINT
 from semgrid_eval.geometry import SE2
-from semgrid_eval.grids.rasterise import STATIC_KERNELS_CELLS, add_points, grid_of, no_points, rasterise
+from semgrid_eval.grids.rasterise import add_points, grid_of, no_points, rasterise
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.sensors.projection import Projection
 from semgrid_eval.sensors.sensor import Points, SensorConfig
 
 ROAD, SIDEWALK, POLE, CAR, PERSON = (CLASS_NAMES.index(n) for n in ("road", "sidewalk", "pole_sign", "car", "person"))
+PRIORITY = [1, 1, 1, 1, 1, 2, 3, 3, 4, 4]  # of unknown it does not matter
 SMALL = GridSpec(rows=16, columns=16, cell_m=2.0, agent_row=16, agent_column=8)
 
 
@@ -27,7 +28,7 @@ def points_of(forward_m, left_m, class_id):
 
 
 def counted(points, grid_from_points, spec):
-    counts = no_points(spec)
+    counts = no_points(GridConfig(spec=spec))
     add_points(counts, points, grid_from_points, spec)
     return counts
 
@@ -69,7 +70,7 @@ def slow_decision(counts, layers):
     for cell in np.ndindex(*grid.shape):
         known = [c for c in range(1, CLASS_COUNT) if layers[(c, *cell)]]
         if known:
-            grid[cell] = min(known, key=lambda c: (-CLASSES[c].category, -counts[(c, *cell)], c))
+            grid[cell] = min(known, key=lambda c: (-PRIORITY[c], -counts[(c, *cell)], c))
     return grid
 
 
@@ -77,7 +78,7 @@ def slow_rasterise(counts):
     grid = slow_decision(counts, counts > 0)
     layers = np.zeros(counts.shape, bool)
     for class_id in range(1, CLASS_COUNT):
-        sizes = (3, 2, 4, 4) if CLASSES[class_id].category == 0 else (1, 1, 2, 2)
+        sizes = (3, 2, 4, 4) if DEFAULT_CLASSES.classes[class_id].category == "static" else (1, 1, 2, 2)
         layer = grid == class_id
         # The erosion of a cell looks at offsets -k//2 ... of it; outside the grid nothing erodes and nothing grows.
         layer = spread(layer, sizes[0], reflect=True)
@@ -107,7 +108,7 @@ def test_morphology_and_priorities_match_a_slow_twin(seed, density):
     rng = np.random.default_rng(seed)
     counts = rng.integers(1, 4, (CLASS_COUNT, 14, 14)) * (rng.random((CLASS_COUNT, 14, 14)) < density)
     counts = counts.astype(np.int32)
-    np.testing.assert_array_equal(rasterise(counts), slow_rasterise(counts))
+    np.testing.assert_array_equal(rasterise(counts, DEFAULT_CLASSES), slow_rasterise(counts))
 
 
 def test_small_and_dynamic_classes_win_over_many_points_of_static_ones():
@@ -115,21 +116,21 @@ def test_small_and_dynamic_classes_win_over_many_points_of_static_ones():
     counts[ROAD], counts[SIDEWALK] = 5, 6
     counts[POLE, 0], counts[CAR, 1], counts[PERSON, 2] = 1, 1, 1
     counts[POLE, 1:3], counts[CAR, 2] = 9, 9
-    grid = rasterise(counts, "off")
+    grid = rasterise(counts, DEFAULT_CLASSES, "off")
     assert [set(row) for row in grid] == [{POLE}, {CAR}, {PERSON}, {SIDEWALK}]
 
 
 def test_equal_counts_of_equal_priority_go_to_the_lower_id():
     counts = np.zeros((CLASS_COUNT, 2, 2), np.int32)
     counts[ROAD] = counts[SIDEWALK] = 3
-    assert (rasterise(counts, "off") == ROAD).all()
+    assert (rasterise(counts, DEFAULT_CLASSES, "off") == ROAD).all()
 
 
 def test_even_kernels_do_not_shift_small_objects():
     counts = np.zeros((CLASS_COUNT, 20, 20), np.int32)
     counts[CAR, 5:9, 7:12] = 1
-    np.testing.assert_array_equal(rasterise(counts), rasterise(counts, "off"))
-    shifted = rasterise(counts, "opencv") == CAR
+    np.testing.assert_array_equal(rasterise(counts, DEFAULT_CLASSES), rasterise(counts, DEFAULT_CLASSES, "off"))
+    shifted = rasterise(counts, DEFAULT_CLASSES, "opencv") == CAR
     assert ndimage.center_of_mass(shifted) == pytest.approx((7.5, 10.0))  # plain OpenCV: one cell down and right
 
 
@@ -138,14 +139,14 @@ def test_opening_of_small_classes_is_anti_extensive(seed):
     rng = np.random.default_rng(seed)
     counts = np.zeros((CLASS_COUNT, 20, 20), np.int32)
     counts[CAR] = rng.random((20, 20)) < 0.6
-    assert not ((rasterise(counts) == CAR) & (counts[CAR] == 0)).any()
+    assert not ((rasterise(counts, DEFAULT_CLASSES) == CAR) & (counts[CAR] == 0)).any()
 
 
 def test_a_lone_cell_of_a_small_class_is_filtered_and_two_by_two_stay():
     counts = np.zeros((CLASS_COUNT, 20, 20), np.int32)
     counts[POLE, 3, 3] = 1
     counts[POLE, 10:12, 10:12] = 1
-    assert (rasterise(counts) == POLE).sum() == 4
+    assert (rasterise(counts, DEFAULT_CLASSES) == POLE).sum() == 4
 
 
 def road_with_gap(gap_m, cell_m):
@@ -153,12 +154,14 @@ def road_with_gap(gap_m, cell_m):
     spec = GridSpec(rows=64, columns=64, cell_m=cell_m, agent_row=64, agent_column=32)
     x, y = np.meshgrid(np.arange(0.05, 64 * cell_m, 0.1), np.arange(0.05, 64 * cell_m, 0.1) - 32 * cell_m)
     is_seen = np.abs(x - 32 * cell_m) > gap_m / 2
-    return rasterise(counted(points_of(x, y, np.where(is_seen, ROAD, NO_POINT)), SE2(0.0, 0.0, 0.0), spec))
+    return rasterise(
+        counted(points_of(x, y, np.where(is_seen, ROAD, NO_POINT)), SE2(0.0, 0.0, 0.0), spec), DEFAULT_CLASSES
+    )
 
 
 @pytest.mark.parametrize("cell_m", [0.8, 0.4])
 def test_kernels_are_cells_so_that_a_finer_grid_bridges_shorter_gaps(cell_m):
-    assert STATIC_KERNELS_CELLS[0] == 3
+    assert DEFAULT_CLASSES.kernels_cells(ROAD)[0] == 3
     bridged = [gap for gap in (2, 4, 6) if (road_with_gap(gap * cell_m, cell_m)[20:44, 20:44] == ROAD).all()]
     assert bridged == [2], "a dilation by 3 cells reaches one cell from either side, 1.6 m at most or 0.8 m"
 

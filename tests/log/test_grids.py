@@ -5,11 +5,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from support.exact_grids import read_exact
 
-from semgrid_eval.classes import CLASS_NAMES, CLASSES
-from semgrid_eval.log.grids import CERTAINTY, MASK, GridPlace, exact_message, viewer_message
-from semgrid_eval.log.grids import CLASSES as CLASS_LAYER
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES
+from semgrid_eval.log.grids import CERTAINTY, MASK, GridPlace, class_layer, exact_message, viewer_message
 
 ROAD, CAR, PERSON = (CLASS_NAMES.index(name) for name in ("road", "car", "person"))
+CLASS_LAYER = class_layer(DEFAULT_CLASSES)
 PLACE = GridPlace(cell_m=0.5, corner_x_m=2.0, corner_y_m=1.0)  # 4 rows ahead of the origin, 2 columns left of it
 
 
@@ -36,7 +36,7 @@ def test_an_asymmetric_grid_lies_ahead_and_left_as_it_should():
     known = {place: cell["class_id"] for place, cell in drawn.items() if cell["class_id"]}
     assert known == {(1.75, 0.75): CAR, (0.25, -0.25): PERSON, (1.75, -0.25): ROAD}
     car = drawn[1.75, 0.75]
-    assert (car["red"], car["green"], car["blue"], car["alpha"]) == (*CLASSES[CAR].colour, 255)
+    assert (car["red"], car["green"], car["blue"], car["alpha"]) == (*DEFAULT_CLASSES.classes[CAR].colour, 255)
     assert drawn[0.25, 0.75]["alpha"] == 0, "unknown hides nothing"
 
 

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 from mcap.writer import Writer
+from support.own_classes import class_set
 
-from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.log.codec import PREDICTIONS_RECORD
-from semgrid_eval.log.grids import CLASSES, GridPlace, exact_message
+from semgrid_eval.log.grids import GridPlace, class_layer, exact_message
 from semgrid_eval.log.predictions import (
     TOPIC,
     GridExtent,
@@ -19,7 +20,8 @@ from semgrid_eval.log.predictions import (
 )
 from semgrid_eval.log.writer import MessageWriter
 
-EXTENT = GridExtent(4, 3, GridPlace(0.5, 2.0, 0.5))
+EXTENT = GridExtent(4, 3, GridPlace(0.5, 2.0, 0.5), DEFAULT_CLASSES)
+CLASSES = class_layer(DEFAULT_CLASSES)
 MS = 1_000_000
 
 
@@ -60,7 +62,7 @@ def test_what_is_written_comes_back(tmp_path):
 
 
 def test_a_log_without_a_record_belongs_to_the_recording_of_its_name(tmp_path):
-    path = write(tmp_path / "drive_7#2.mcap", [(2 * 10**18, prediction_message(prediction(), EXTENT.place))])
+    path = write(tmp_path / "drive_7#2.mcap", [(2 * 10**18, prediction_message(prediction(), CLASSES, EXTENT.place))])
     with PredictionLog(path) as log:
         assert log.recording == "drive_7#2"
 
@@ -71,8 +73,8 @@ def test_of_several_topics_the_one_of_predictions_is_taken_or_one_is_named(tmp_p
     with path.open("wb") as stream, MessageWriter(stream) as writer:
         for topic, message in (
             ("/grid/target/exact", target),
-            ("/grid/prediction/a/exact", prediction_message(prediction(1), EXTENT.place)),
-            ("/node/out", prediction_message(prediction(2), EXTENT.place)),
+            ("/grid/prediction/a/exact", prediction_message(prediction(1), CLASSES, EXTENT.place)),
+            ("/node/out", prediction_message(prediction(2), CLASSES, EXTENT.place)),
         ):
             writer.write(topic, message, log_ns=at_ns)
     assert read(path)[0].capture_ns == prediction(1).capture_ns
@@ -84,7 +86,7 @@ def test_of_several_topics_the_one_of_predictions_is_taken_or_one_is_named(tmp_p
 def test_several_topics_of_predictions_are_ambiguous(tmp_path):
     with (tmp_path / "a.mcap").open("wb") as stream, MessageWriter(stream) as writer:
         for topic in ("/a", "/b"):
-            writer.write(topic, prediction_message(prediction(), EXTENT.place), log_ns=2 * 10**18)
+            writer.write(topic, prediction_message(prediction(), CLASSES, EXTENT.place), log_ns=2 * 10**18)
     with pytest.raises(LogError, match=r"topic: holds semgrid.v1.SemanticGrid as /a, /b: name one"):
         read(tmp_path / "a.mcap")
 
@@ -123,10 +125,23 @@ FAULTS = {
 }
 
 
+def test_predictions_of_other_classes_than_those_that_are_scored_are_refused(tmp_path):
+    own = class_set({"name": "way", "category": "ground", "labels": ["road"]}, categories=[{"name": "ground"}])
+    extent = EXTENT._replace(classes=own)
+    write_predictions(tmp_path / "a.mcap", [prediction()], "a", EXTENT)
+    with (
+        PredictionLog(tmp_path / "a.mcap") as log,
+        pytest.raises(LogError, match=r"class_names: class 1 is 'road', and 'way' is scored"),
+    ):
+        list(log.predictions(extent))
+    with pytest.raises(InputError, match=r"classes: 9 is not a class, which are 0 to 1"):
+        write_predictions(tmp_path / "b.mcap", [prediction(classes=np.full((4, 3), 9, np.uint8))], "a", extent)
+
+
 @pytest.mark.parametrize("kind", FAULTS)
 def test_what_is_no_prediction_of_these_grids_is_refused(tmp_path, kind):
     change, fault = FAULTS[kind]
-    message, at_ns = prediction_message(prediction(), EXTENT.place), prediction().publish_ns
+    message, at_ns = prediction_message(prediction(), CLASSES, EXTENT.place), prediction().publish_ns
     change(message)
     with pytest.raises(LogError) as refused:
         read(write(tmp_path / "a.mcap", [(at_ns, message)], "/node/out"))
@@ -135,7 +150,7 @@ def test_what_is_no_prediction_of_these_grids_is_refused(tmp_path, kind):
 
 def test_publication_that_goes_back_in_the_log_is_refused_and_captures_may(tmp_path):
     first_ns = prediction(2).publish_ns
-    older, newer = (prediction_message(prediction(number), EXTENT.place) for number in (1, 2))
+    older, newer = (prediction_message(prediction(number), CLASSES, EXTENT.place) for number in (1, 2))
     path = write(tmp_path / "a.mcap", [(first_ns, newer), (first_ns, older)])
     assert [each.capture_ns for each in read(path)] == [prediction(2).capture_ns, prediction(1).capture_ns]
     path = write(tmp_path / "b.mcap", [(first_ns, newer), (first_ns - 1, older, first_ns + 1)])
@@ -147,7 +162,7 @@ def test_publication_that_goes_back_in_the_log_is_refused_and_captures_may(tmp_p
 
 @pytest.mark.parametrize("record", [{}, {"recording": ""}])
 def test_a_record_that_names_no_recording_is_refused(tmp_path, record):
-    path = write(tmp_path / "a.mcap", [(1, prediction_message(prediction(), EXTENT.place))], record=record)
+    path = write(tmp_path / "a.mcap", [(1, prediction_message(prediction(), CLASSES, EXTENT.place))], record=record)
     with pytest.raises(LogError, match=r"metadata semgrid.predictions: recording: names no recording"):
         PredictionLog(path)
 
@@ -163,7 +178,7 @@ def test_a_log_without_grids_and_a_message_that_is_none_are_refused(tmp_path):
 
 @pytest.mark.parametrize("cut", [1, 7, 40])
 def test_a_message_that_is_cut_is_damage(tmp_path, cut):
-    data = prediction_message(prediction(), EXTENT.place).SerializeToString()
+    data = prediction_message(prediction(), CLASSES, EXTENT.place).SerializeToString()
     writer = Writer(str(tmp_path / "a.mcap"))
     writer.start()
     schema = writer.register_schema("semgrid.v1.SemanticGrid", "protobuf", b"")

@@ -35,7 +35,7 @@ def sure_answers(windows, share):
 def test_certainty_becomes_the_share_of_right_cells_of_the_predicted_class(windows):
     share = torch.linspace(0.3, 0.9, CLASS_COUNT)
     answer = sure_answers(windows, share)
-    certainty = Certainty()
+    certainty = Certainty(CLASS_COUNT)
     certainty.fit(answer, windows)
     batch = windows.batch(slice(None))
     scaled, raw = certainty(answer(batch)), answer(batch)
@@ -48,7 +48,7 @@ def test_certainty_becomes_the_share_of_right_cells_of_the_predicted_class(windo
 
 
 def test_the_predicted_class_stays_and_sure_cells_stay_surer(windows):
-    certainty = Certainty()
+    certainty = Certainty(CLASS_COUNT)
     certainty.fit(sure_answers(windows, torch.full((CLASS_COUNT,), 0.6)), windows)
     probabilities = torch.rand(2, CLASS_COUNT, 8, 8, generator=torch.Generator().manual_seed(1)).softmax(dim=1)
     scaled = certainty(probabilities)
@@ -59,7 +59,7 @@ def test_the_predicted_class_stays_and_sure_cells_stay_surer(windows):
 
 
 def test_a_class_that_is_never_predicted_keeps_its_certainty(windows):
-    certainty = Certainty()
+    certainty = Certainty(CLASS_COUNT)
     always_third = torch.zeros(CLASS_COUNT)
     always_third[3] = 0.8
 
@@ -72,7 +72,7 @@ def test_a_class_that_is_never_predicted_keeps_its_certainty(windows):
 
 
 def test_what_is_always_right_stays_finite_and_below_one(windows):
-    certainty = Certainty()
+    certainty = Certainty(CLASS_COUNT)
     certainty.fit(sure_answers(windows, torch.ones(CLASS_COUNT)), windows)
     assert bool(torch.isfinite(certainty.slope).all() and torch.isfinite(certainty.offset).all())
     assert float(certainty(torch.eye(CLASS_COUNT)[:, :, None, None]).max()) <= 1.0

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from support.models import given as given_by
 from support.models import made
 
-from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.models.flow import MOVABLE, FlowSettings, MoveOn, find_moves
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES
+from semgrid_eval.models.flow import FlowSettings, MoveOn, find_moves
 from semgrid_eval.models.overlay import FuseAll
 from semgrid_eval.windows.data import WindowBatch
 
@@ -120,9 +120,9 @@ STAYS = {
 @pytest.mark.parametrize("case", STAYS)
 def test_each_piece_of_evidence_alone_keeps_cells_as_they_were_fused(case):
     older, newer, lax = STAYS[case]
-    assert find_moves(older, newer, GAP_S / CELL_M, FlowSettings()) == []
+    assert find_moves(older, newer, GAP_S / CELL_M, DEFAULT_CLASSES, FlowSettings()) == []
     np.testing.assert_array_equal(moved_on(older, newer), fused(older, newer))
-    assert len(find_moves(older, newer, GAP_S / CELL_M, FlowSettings(**lax))) == 1
+    assert len(find_moves(older, newer, GAP_S / CELL_M, DEFAULT_CLASSES, FlowSettings(**lax))) == 1
 
 
 def test_classes_do_not_turn_into_each_other():
@@ -134,7 +134,7 @@ def test_two_cars_in_a_lane_are_not_mixed_up():
     older = with_box(with_box(road(), 18, 8), 10, 8)
     newer = with_box(with_box(road(), 15, 8), 7, 8)
     np.testing.assert_array_equal(moved_on(older, newer), with_box(with_box(road(), 12, 8), 4, 8))
-    moves = find_moves(older, newer, GAP_S / CELL_M, FlowSettings())
+    moves = find_moves(older, newer, GAP_S / CELL_M, DEFAULT_CLASSES, FlowSettings())
     assert [move.shift.tolist() for move in moves] == [[-3, 0]] * 2
 
 
@@ -153,14 +153,14 @@ def test_any_grids_give_classes_and_each_component_moves_once(seed):
     random = np.random.default_rng(seed)
     older, newer = (np.kron(random.integers(0, 10, (8, 8)), np.ones((2, 2))).astype(np.uint8) for _ in range(2))
     config = FlowSettings(overlap=0, size_ratio=0, seen=0, still_there=1)
-    moves = find_moves(older, newer, 5.0, config)
+    moves = find_moves(older, newer, 5.0, DEFAULT_CLASSES, config)
     assert moved_on(older, newer, **config.model_dump()).max() < len(CLASS_NAMES)
     for grid, cells in ((older, [move.older for move in moves]), (newer, [move.newer for move in moves])):
         places = np.concatenate([*cells, np.zeros((0, 2), int)])
         assert len(np.unique(places, axis=0)) == len(places)
         for move, mine in zip(moves, cells, strict=True):
             assert (grid[tuple(mine.T)] == move.class_id).all()
-            assert move.class_id in MOVABLE
+            assert move.class_id in DEFAULT_CLASSES.movable
 
 
 def test_two_inputs_of_one_time_tell_no_motion():

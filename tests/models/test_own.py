@@ -252,7 +252,7 @@ def guarded(tmp_path, base, answer):
 def test_wrong_answers_are_one_line_that_names_the_model(tmp_path, batch, base, answer, message):
     model = guarded(tmp_path, base, answer)
     with pytest.raises(InputError, match=message) as caught:
-        require_scores(model.predict(batch), batch, model.called)
+        require_scores(model.predict(batch), batch, model)
     assert str(caught.value).startswith(f"{tmp_path}/own.py:Own: ")
     assert "\n" not in str(caught.value)
 

@@ -10,6 +10,7 @@ from support.exact_grids import read_exact
 from support.small_runs import WINDOW, run, write_logs
 from support.toy_world import FRAME_NS, START_NS
 
+from semgrid_eval.classes import DEFAULT_CLASSES
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.grids.extent import extent_of
 from semgrid_eval.grids.spec import GridSpec
@@ -174,7 +175,7 @@ def test_rows_lie_side_by_side_with_one_target_for_all(made, play):
 
 
 def test_the_rows_of_a_played_log_are_predictions_by_their_topics(made, play):
-    log, extent = play("ed", "newest").log, extent_of(GridSpec())
+    log, extent = play("ed", "newest").log, extent_of(GridSpec(), DEFAULT_CLASSES)
     with (
         PredictionLog(log) as read,
         pytest.raises(LogError, match="/grid/prediction/1/exact, /grid/prediction/2/exact"),

@@ -7,7 +7,7 @@ from mcap.reader import make_reader
 from PIL import Image
 from support.small_runs import run, write_logs
 
-from semgrid_eval.classes import class_palette
+from semgrid_eval.classes import DEFAULT_CLASSES
 from semgrid_eval.playback.write import Play, write_playback
 
 
@@ -50,7 +50,7 @@ def test_viewers_pictures_and_programs_are_told_the_same_grid(messages, topic, t
         cells = np.frombuffer(grid.data, np.uint8).reshape(-1, grid.column_count, grid.cell_stride)
         shown = cells.transpose(1, 0, 2)[::-1, ::-1]
         np.testing.assert_array_equal(shown[..., 4], ids)
-        expected = class_palette()[ids]
+        expected = DEFAULT_CLASSES.palette()[ids]
         np.testing.assert_array_equal(shown[..., :3][ids > 0], expected[ids > 0])
         np.testing.assert_array_equal(shown[..., 3], np.where(ids, 255, 0))
         if topic == "/grid/target":

@@ -10,7 +10,8 @@ from semgrid_eval.executors import Processes
 from semgrid_eval.models import fitting
 from semgrid_eval.models.registry import ENTRY_POINT_GROUP, own_models
 from semgrid_eval.scores import results
-from semgrid_eval.scores.metrics.iou import category_iou, class_iou
+from semgrid_eval.scores.metrics.iou import class_iou
+from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.workplace import Limits
 
 NETWORK = """
@@ -74,7 +75,7 @@ def score(out, record, name):
     row = next(row for row in record.rows if row.name == name)
     result_of(out, row)
     counts = results.read_sums(results.result_folder(out, row.results[0]), "iou", "all")[:, 0]
-    return float(category_iou(class_iou(counts.sum(axis=0)))["mean_known"])
+    return float(IOU.means(class_iou(counts.sum(axis=0)))["mean_known"])
 
 
 def test_an_own_network_is_trained_like_a_built_in_one(logs, tmp_path, small):

@@ -18,7 +18,8 @@ from support.pages import ROOT
 from semgrid_eval.cli.main import cli
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.log.store import find_logs, read_recording, write_log
-from semgrid_eval.scores.metrics.iou import category_iou, class_iou
+from semgrid_eval.scores.metrics.iou import class_iou
+from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.scores.results import read_run, read_sums, result_folder
 
 LIDAR, TRACKS, CAMERAS = (os.environ.get(f"SEMGRID_REAL_{name}", "") for name in ("LIDAR", "TRACKS", "DATA"))
@@ -80,7 +81,7 @@ def scores(folder, logs, names):
     found = {}
     for row in read_run(Path(f"{logs}-run")).rows:
         counts = read_sums(result_folder(Path(f"{logs}-run"), row.results[0]), "iou", "all")[:, 0]
-        found[row.name] = category_iou(class_iou(counts.sum(axis=0)))["mean_known"]
+        found[row.name] = IOU.means(class_iou(counts.sum(axis=0)))["mean_known"]
     return found
 
 

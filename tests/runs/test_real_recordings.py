@@ -8,7 +8,8 @@ import yaml
 from click.testing import CliRunner
 
 from semgrid_eval.cli.main import cli
-from semgrid_eval.scores.metrics.iou import category_iou, class_iou
+from semgrid_eval.scores.metrics.iou import class_iou
+from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.scores.results import read_run, read_sums, result_folder
 
 REAL = os.environ.get("SEMGRID_REAL_DATA", "")
@@ -35,5 +36,5 @@ def test_aligning_beats_repeating_and_fusing_beats_both(tmp_path):
     score = {}
     for row in read_run(tmp_path / "run").rows:
         counts = read_sums(result_folder(tmp_path / "run", row.results[0]), "iou", "all")[:, 0]
-        score[row.name] = category_iou(class_iou(counts.sum(axis=0)))["mean_known"]
+        score[row.name] = IOU.means(class_iou(counts.sum(axis=0)))["mean_known"]
     assert score["BL-Fuse"] > score["BL-DC"] > score["BL-NT"] + 0.02

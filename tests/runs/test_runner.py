@@ -14,7 +14,8 @@ from semgrid_eval.executors import Processes
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.types import Actor, Pose
 from semgrid_eval.scores import results
-from semgrid_eval.scores.metrics.iou import category_iou, class_iou
+from semgrid_eval.scores.metrics.iou import class_iou
+from semgrid_eval.scores.metrics.table import IOU
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,7 @@ def score(out, record, name):
     row = next(row for row in record.rows if row.name == name)
     assert row.failure is None, row.failure
     counts = results.read_sums(results.result_folder(out, row.results[0]), "iou", "all")[:, 0]
-    return float(category_iou(class_iou(counts.sum(axis=0)))["mean_known"])
+    return float(IOU.means(class_iou(counts.sum(axis=0)))["mean_known"])
 
 
 def test_alignment_beats_none_and_a_reversed_motion_is_worse_than_both(tmp_path):

@@ -3,7 +3,7 @@ import pytest
 from support.driving import driving
 from support.toy_world import Mount, street
 
-from semgrid_eval.classes import NO_POINT, class_map
+from semgrid_eval.classes import DEFAULT_CLASSES, NO_POINT
 from semgrid_eval.errors import LogError
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
@@ -21,7 +21,7 @@ def log(tmp_path):
 
 
 def read(log, **sensors):
-    return list(read_cameras(log, sensors, class_map()))
+    return list(read_cameras(log, sensors, DEFAULT_CLASSES.class_by_label()))
 
 
 def test_a_part_of_an_image_holds_the_points_of_its_pixels_alone(log):

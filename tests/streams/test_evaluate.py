@@ -59,7 +59,7 @@ def plain(data, model, window, *, translate):
         truth, left_out = data.grids[0, frame].numpy()[None], unseen_truth(data, np.array([frame]))
         place = np.flatnonzero(targets == frame)
         answer = prediction[place] if len(place) else np.full_like(truth, UNKNOWN)
-        found += confusion(truth, answer, left_out)[0]
+        found += confusion(truth, answer, left_out, CLASS_COUNT)[0]
     return found
 
 

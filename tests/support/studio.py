@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 from support.npm import kept
 
-from semgrid_eval.classes import CLASSES
+from semgrid_eval.classes import DEFAULT_CLASSES
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
@@ -138,4 +138,4 @@ def panels(driver):
 def colours(panel):
     """How many pixels of each class's colour a panel shows."""
     picture = np.asarray(Image.open(io.BytesIO(panel.screenshot_as_png)).convert("RGB"))
-    return {each.name: int((picture == each.colour).all(axis=-1).sum()) for each in CLASSES}
+    return {each.name: int((picture == each.colour).all(axis=-1).sum()) for each in DEFAULT_CLASSES.classes}

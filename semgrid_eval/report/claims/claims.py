@@ -11,9 +11,9 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.report.rows.load import Run
-from semgrid_eval.scores.metrics.iou import category_iou
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES
+from semgrid_eval.report.rows.load import Row, Run
+from semgrid_eval.scores.metrics.table import IOU
 
 MARGIN = 0.02
 """IoU: differences within it count as close, and a loss within it as none."""
@@ -181,8 +181,13 @@ PAPER_WINDOWS = 500
 
 
 def on_cityscapes(run: Run) -> bool:
-    """Tell whether all logs of a run are of the paper's data set, so that its values can stand beside the paper's."""
-    return {log.dataset for log in run.record.logs} == {PAPER_DATASET}
+    """Tell whether a run is of the paper's data set and classes, so that its values can stand beside the paper's."""
+    return has_papers_classes(run) and {log.dataset for log in run.record.logs} == {PAPER_DATASET}
+
+
+def has_papers_classes(run: Run) -> bool:
+    """Tell whether a run's grids have the paper's classes, which its claims and values are about."""
+    return all(row.classes == DEFAULT_CLASSES for row in run.rows)
 
 
 def in_paper(name: str) -> bool:
@@ -190,9 +195,14 @@ def in_paper(name: str) -> bool:
     return name in paper_table()
 
 
-def paper_value(name: str, column: str) -> float:
-    """Return the paper's value of a class or category for a row of that name, NaN where it has none."""
-    return paper_table().get(name, {}).get(column, np.nan)
+def is_papers(row: Row) -> bool:
+    """Tell whether the paper has a row of that name, and of the same classes."""
+    return row.classes == DEFAULT_CLASSES and in_paper(row.record.name)
+
+
+def paper_value(row: Row, column: str) -> float:
+    """Return the paper's value of a class or category for such a row, NaN where it has none."""
+    return paper_table()[row.record.name].get(column, np.nan) if is_papers(row) else np.nan
 
 
 @cache
@@ -200,14 +210,14 @@ def paper_table() -> dict[str, dict[str, float]]:
     """Return the paper's values by row name and class; the categories follow as means of the classes (reading 11)."""
     with resources.files("semgrid_eval.report").joinpath("data/table_a1.csv").open("rb") as stream:
         table = pd.read_csv(stream, index_col="experiment")[list(CLASS_NAMES)]
-    categories = category_iou(table.to_numpy(np.float64))
+    categories = IOU.means(table.to_numpy(np.float64))
     whole = table.assign(**categories)
     return {str(name): {str(key): float(value) for key, value in row.items()} for name, row in whole.iterrows()}
 
 
 def scaling(run: Run) -> str:
     """Say how the training of rows that the paper has, too, differs from the paper's; empty if none was trained."""
-    rows = [row for row in run.rows if row.results and in_paper(row.record.name)]
+    rows = [row for row in run.rows if row.results and is_papers(row)]
     trained = [row for row in rows if row.results[0].record.seed is not None]
     if not trained:
         return ""

@@ -8,14 +8,19 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from semgrid_eval.report.claims.claims import MARGIN, WINDOW_MS, Check, Claim, Rule, claims
-from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, Scores, weighted_sum
+from semgrid_eval.report.claims.claims import MARGIN, WINDOW_MS, Check, Claim, Rule, claims, has_papers_classes
+from semgrid_eval.report.estimates.bootstrap import Estimate, Scores, weighted_sum
 from semgrid_eval.report.rows.load import Run
 from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, plural
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, plain_table
+from semgrid_eval.scores.metrics.table import IOU
 
 TRUTH = "logs that tell where true actors move"
 SAME_TARGETS = "rows with the same targets"
+FINDING_COLUMNS = (
+    *("run", "name", "claim", "verdict", "comparison", "score", "region", "rule", "margin", "comparison_verdict"),
+    *("difference", "low", "high", "windows", "missing"),
+)
 
 
 class Verdict(StrEnum):
@@ -59,9 +64,12 @@ class Finding:
 
 
 def find(runs: Sequence[Run], scores: Scores, regions: Mapping[str, Scores]) -> list[Finding]:
-    """Test every claim on every run, from the scores of all cells and of those near moving and standing actors."""
+    """Test every claim on every run, from the scores of all cells and of those near moving and standing actors.
+
+    They are about the paper's classes: runs of others have no findings.
+    """
     found = []
-    for run in runs:
+    for run in filter(has_papers_classes, runs):
         places = {  # rows by their names in the matrix, which the claims go by
             region: {entry.row.record.name: entry for entry in of.values() if entry.row.run == run.folder}
             for region, of in {"": scores, **regions}.items()
@@ -85,6 +93,8 @@ def judge(rule: Rule, difference: Estimate) -> Verdict:
 
 def sentence(findings: Sequence[Finding]) -> str:
     """Count the verdicts in words."""
+    if not findings:
+        return "The paper's claims and values are about its own classes; these rows have others, so none is shown."
     count = {kind: sum(each.verdict is kind for each in findings) for kind in Verdict}
     tested = len(findings) - count[Verdict.NOT_RUN]
     if not tested:
@@ -117,7 +127,8 @@ def missing_table(name: str, findings: Sequence[Finding]) -> Table:
 
 def finding_frame(findings: Sequence[Finding]) -> pd.DataFrame:
     """Return one line for each comparison, with the verdict of its claim beside its own."""
-    return pd.DataFrame([_head(each) | part for each in findings for part in map(_values, each.outcomes)])
+    lines = [_head(each) | part for each in findings for part in map(_values, each.outcomes)]
+    return pd.DataFrame(lines, columns=list(FINDING_COLUMNS))
 
 
 def finding_records(findings: Sequence[Finding]) -> list[dict[str, Any]]:
@@ -169,7 +180,7 @@ def _line(outcome: Outcome) -> Line:
     elif check.score == WINDOW_MS:
         label, number = "ms a window", _time_cell(difference)
     else:
-        label = LABELS[check.score] + (f", {check.region}" if check.region else "")
+        label = IOU.labels[check.score] + (f", {check.region}" if check.region else "")
         title = f"{interval_phrase(difference, with_sign=True)}; {plural(outcome.windows, 'window')}"
         number = difference_cell(difference, title=title)
     return Line(check.text, (_verdict_cell(outcome.verdict), Cell(label), number), "part")

@@ -12,16 +12,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
+from semgrid_eval.errors import InputError
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division, RowSums, row_sums
 from semgrid_eval.report.estimates.student import stretch
 from semgrid_eval.report.rows.load import Result, Row, comparable
+from semgrid_eval.scores.metrics.iou import Iou
 from semgrid_eval.scores.metrics.metric import Counts, Floats, Metric, column_names, column_of, divided, mean_finite
-from semgrid_eval.scores.metrics.table import IOU, METRICS
+from semgrid_eval.scores.metrics.table import IOU, metrics_of
 
 LEVEL = 0.95
-LABELS = {column.name: column.label for column in IOU.columns}
-"""Every figure of IoU in words: the classes, the categories, and the categories with their classes merged."""
-
 Level = Literal["recordings", "groups"]
 
 DRAWS = 1000
@@ -206,11 +206,37 @@ def interval_of(value: float, draws: Floats, limits: tuple[float, float] = (-np.
 
 
 def score_all(rows: Sequence[Row], divisions: Sequence[Division], resampling: Resampling) -> Everything:
-    """Score rows by every metric in all regions of the divisions."""
+    """Score rows by every metric in all regions of the divisions.
+
+    Raises:
+        InputError: rows have different classes.
+    """
     return {
         metric.name: {each.name: score_regions(rows, metric, each, resampling) for each in divisions}
-        for metric in METRICS.values()
+        for metric in metrics_of(classes_of(rows)).values()
     }
+
+
+def classes_of(rows: Iterable[Row]) -> ClassSet:
+    """Return the classes of rows that are scored side by side; the default ones where no row has a result.
+
+    Raises:
+        InputError: they have different ones, so that their figures have nothing in common.
+    """
+    known: dict[ClassSet, Row] = {}
+    for row in rows:
+        if row.results:
+            known.setdefault(row.classes, row)
+    if len(known) > 1:
+        first, second, *_ = known.values()
+        fault = f"row {second.name} has other classes than {first.name} of {first.run}: report them apart"
+        raise InputError(fault, path=second.run, field="grid.classes")
+    return next(iter(known), DEFAULT_CLASSES)
+
+
+def shared_iou(entries: Iterable[RowScores]) -> Iou:
+    """Return the IoU that rows are scored by; it says which figures there are for their classes."""
+    return next((entry.metric for entry in entries if isinstance(entry.metric, Iou)), IOU)
 
 
 def everywhere(everything: Everything, metric: str) -> Scores:

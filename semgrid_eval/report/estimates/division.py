@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.report.rows.load import Result, Row
-from semgrid_eval.scores.metrics.metric import Counts, Metric, Partition
+from semgrid_eval.scores.metrics.metric import Counts, Metric, Partition, Shown
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.tidy import windows_with
 
@@ -16,20 +16,16 @@ from semgrid_eval.scores.tidy import windows_with
 class Division:
     """What is scored apart: names of its regions, and how to get what a metric counted in them.
 
-    `shown` is what a report shows of it: columns by metric; where it is empty, each metric's own choice. `sums` returns
-    what a metric counted for a result, (N, regions, ...), None where the result does not tell.
+    `shown` chooses the columns of a metric that a report shows of it. `sums` returns what a metric counted for a
+    result, (N, regions, ...), None where the result does not tell.
     """
 
     name: str  # in files and columns
     regions: Sequence[str]
     words: str  # what the regions hold, to follow "IoU"
-    shown: Mapping[str, Sequence[str]]
+    shown: Shown
     sums: Callable[[Row, Result, Metric], NDArray[np.int32] | None]
     by_inputs: bool = False  # whether rows of other inputs have other cells, or windows, in a region
-
-    def columns(self, metric: Metric) -> Sequence[str]:
-        """Return the columns of a metric that a report shows."""
-        return self.shown.get(metric.name, () if self.shown else metric.shown)
 
 
 def of_cells(partition: Partition) -> Division:
@@ -46,7 +42,7 @@ def of_windows(
     name: str,
     kinds: Sequence[str],
     words: str,
-    shown: Mapping[str, Sequence[str]],
+    shown: Shown,
     number: Callable[[Row, Result], NDArray[np.int64]],
 ) -> Division:
     """Divide by kinds of windows, all of whose cells count; `number` numbers those of a result: (N,), -1 if unknown."""

@@ -1,6 +1,7 @@
 """A gate for changes: is a run clearly below an earlier one, row by row, by more than what is allowed?"""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from math import isfinite, nan
@@ -9,11 +10,12 @@ from pathlib import Path
 from semgrid_eval.errors import InputError
 from semgrid_eval.faults import meant, not_one_of
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.report.estimates.bootstrap import LABELS, SEED, Estimate, Level, Resampling, Scores, score_regions
+from semgrid_eval.report.estimates.bootstrap import SEED, Estimate, Level, Resampling, Scores, classes_of, score_regions
 from semgrid_eval.report.estimates.division import EVERYWHERE
 from semgrid_eval.report.rows.load import Row, Run, comparable, load_runs
 from semgrid_eval.report.rows.pairing import changed_targets, settings_of
-from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores import results
+from semgrid_eval.scores.metrics.table import IOU, iou_of
 
 OPTION = "fail-below"
 
@@ -45,7 +47,19 @@ class Verdict:
         return f"{self.row}, {self.limit.column}: {d.value:+.4f} [{d.low:+.4f}, {d.high:+.4f}] {what} {least:.4f}"
 
 
-def parse_limit(text: str) -> Limit:
+def columns_of(run: Path) -> Collection[str]:
+    """Return the columns that limits of a run may be of: the figures of the classes that its results have.
+
+    Raises:
+        InputError: the run cannot be read.
+    """
+    for result_id in (each for row in results.read_run(run).rows for each in row.results):
+        with suppress(InputError):  # the gate says what is wrong with it
+            return iou_of(results.read_result(results.result_folder(run, result_id)).classes).labels
+    return IOU.labels
+
+
+def parse_limit(text: str, columns: Collection[str]) -> Limit:
     """Read a limit, `COLUMN: DIFFERENCE`, such as `vehicles: -0.01`.
 
     Raises:
@@ -58,8 +72,8 @@ def parse_limit(text: str) -> Limit:
         least = nan
     if not isfinite(least):
         raise InputError(f"{text!r} is not of the form 'vehicles: -0.01'", field=OPTION)
-    if column not in LABELS:
-        raise InputError(not_one_of(column, LABELS), field=OPTION)
+    if column not in columns:
+        raise InputError(not_one_of(column, columns), field=OPTION)
     if not -1.0 <= least <= 0.0:
         raise InputError(f"{text!r}: what may be lost of an IoU is a number from -1 to 0", field=OPTION)
     return Limit(column, least)
@@ -111,7 +125,7 @@ def hold(pairs: Sequence[tuple[Row, Row]], limits: Sequence[Limit], resampling: 
     for one, other in pairs:
         _require_comparable(one, other)
     both = [row for pair in pairs for row in pair]
-    scores = score_regions(both, IOU, EVERYWHERE, resampling).get("all", {})
+    scores = score_regions(both, iou_of(classes_of(both)), EVERYWHERE, resampling).get("all", {})
     return tuple(_verdict(scores, pair, limit) for pair in pairs for limit in limits)
 
 

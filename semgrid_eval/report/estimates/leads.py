@@ -5,9 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores, fewest_units, interval_of, stretched
+from semgrid_eval.report.estimates.bootstrap import (
+    Estimate,
+    RowScores,
+    Scores,
+    fewest_units,
+    interval_of,
+    shared_iou,
+    stretched,
+)
 from semgrid_eval.report.estimates.streams import facts_of
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, settings_but
+from semgrid_eval.report.rows.pairing import settings_but
 from semgrid_eval.scores.metrics.metric import column_names
 
 
@@ -54,5 +62,5 @@ def lead_series(scores: Scores) -> list[LeadSeries]:
 
 def best_leads(found: Sequence[LeadSeries]) -> dict[str, float]:
     """Return the best lead in ms of the first series, for each category that has values; nothing without a series."""
-    best = {column: found[0].best(column) for column in DIFFERENCE_COLUMNS} if found else {}
+    best = {column: found[0].best(column) for column in shared_iou(found[0].entries).compared} if found else {}
     return {column: lead.value for column, (entry, lead) in best.items() if np.isfinite(entry.mean[column])}

@@ -13,6 +13,8 @@ from semgrid_eval.report.estimates.division import Division, of_cells, of_window
 from semgrid_eval.report.estimates.streams import warm_up
 from semgrid_eval.report.examples.thumbnails import RunThumbnails
 from semgrid_eval.report.rows.load import Result, Row, Run
+from semgrid_eval.scores.metrics.iou import Iou
+from semgrid_eval.scores.metrics.metric import Metric
 from semgrid_eval.scores.regions.table import PARTITIONS
 from semgrid_eval.scores.thumbnails import Track
 
@@ -33,7 +35,12 @@ def paces(runs: Sequence[Run]) -> Division:
             shared[key] = _paces(result, kept[row.run])
         return shared[key]
 
-    return of_windows("paces", PACES, _WORDS, {"iou": ("static_known", "vehicles")}, number)
+    return of_windows("paces", PACES, _WORDS, _shown, number)
+
+
+def _shown(metric: Metric) -> Sequence[str]:
+    """Show the background and what moves first."""
+    return (metric.compared[1], *metric.moving[:1]) if isinstance(metric, Iou) else ()
 
 
 def mean_speed_mps(track: Track, from_ns: int, to_ns: int) -> float:

@@ -14,6 +14,7 @@ from semgrid_eval.report.estimates.division import Division, of_windows
 from semgrid_eval.report.rows.load import Result, Row, Run
 from semgrid_eval.report.rows.pairing import settings_but
 from semgrid_eval.scores.facts import StreamFacts, StreamRecord
+from semgrid_eval.scores.metrics.metric import only
 
 _CHAIN = ("profile", "profile_model", "scale")
 _LATENCY = ("latency_ms", "added_ms", *_CHAIN)
@@ -149,7 +150,7 @@ def warm_up(runs: Sequence[Run]) -> Division:
             starts[key] = _since_start_ns(result)
         return np.where(starts[key] >= slowest_ms.get(row.targets, 0.0) * 1e6, 0, -1)
 
-    return of_windows("warm_up", (WARM,), "of streams, " + WARM, {"iou": ("mean_known",)}, number)
+    return of_windows("warm_up", (WARM,), "of streams, " + WARM, only("iou"), number)
 
 
 def _since_start_ns(result: Result) -> NDArray[np.int64]:

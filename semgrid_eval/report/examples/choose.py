@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_NAMES, KNOWN_IDS
 from semgrid_eval.report.rows.load import Result, Row, comparable, key_of
 from semgrid_eval.report.rows.pairing import Headline, reference_of, settings_but
 from semgrid_eval.scores.metrics.iou import class_iou
@@ -75,7 +74,7 @@ def contests(rows: Sequence[Row], headline: Headline | None) -> list[Contest]:
 def choose(contest: Contest, *, best: int, worst: int) -> list[Pick]:
     """Choose windows by the mean over classes: the largest values of the rule, then the smallest."""
     gaps = rule_values(contest)
-    values = mean_finite(gaps[:, KNOWN_IDS])
+    values = mean_finite(gaps[:, contest.model.classes.known])
     order = _ordered(values)
     top = _of_other_recordings(contest.result, order, best)
     left = _of_other_recordings(contest.result, order[~np.isin(order, top)][::-1], worst)
@@ -86,10 +85,11 @@ def choose(contest: Contest, *, best: int, worst: int) -> list[Pick]:
 def choose_by_class(contest: Contest) -> list[Pick]:
     """Choose, for each class but `unknown`, the window with the largest and the one with the smallest value."""
     gaps, picks = rule_values(contest), []
-    for index in KNOWN_IDS:
+    classes = contest.model.classes
+    for index in classes.known:
         order = _ordered(gaps[:, index])
         ends = [(order[0], "largest"), (order[-1], "smallest")] if len(order) > 1 else [(i, "only") for i in order]
-        label = CLASS_NAMES[index].replace("_", " ").capitalize()
+        label = classes.names[index].replace("_", " ").capitalize()
         picks += [Pick(int(i), f"{label}, {end}", float(gaps[i, index])) for i, end in ends]
     return picks
 
@@ -108,7 +108,7 @@ def mean_iou(result: Result, window: WindowRecord) -> float:
         return float("nan")
     counts = result.counts[[at]].astype(np.int64)
     values = np.where(counts.sum(axis=2) < MIN_CELLS, np.nan, class_iou(counts))
-    return float(mean_finite(values[0, KNOWN_IDS]))
+    return float(mean_finite(values[0, result.classes.known]))
 
 
 def rule_values(contest: Contest) -> Floats:

@@ -10,13 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, MASK_COLOUR, NO_POINT, UNKNOWN, class_palette
+from semgrid_eval.classes import MASK_COLOUR, NO_POINT, UNKNOWN, ClassSet
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.recording.png import decode_ids
 
 Grid = NDArray[np.uint8]
 PictureKind = Literal["camera", "labels", "grid"]
+Words = tuple[str, str]
+"""The title of a picture, and what it shows."""
+Legend = tuple[tuple[str, str], ...]
+"""Names and their colours."""
 
-MASKED, POINTLESS, HATCHED = CLASS_COUNT, CLASS_COUNT + 1, CLASS_COUNT + 2
 POINTLESS_COLOUR = (226, 232, 240)
 HATCH_COLOUR = (0, 255, 255)
 RIGHT_COLOURS = ((0, 0, 0), (128, 132, 138), (0, 114, 178), (230, 159, 0), (90, 60, 90), (255, 255, 255))
@@ -24,6 +28,7 @@ RIGHT_LABELS = ("unknown in all", "both right", "only the model right", "only th
 SHARE_ENDS = ((255, 244, 214), (122, 4, 3))
 """Colours of no share and of the highest one."""
 _CERTAINTY_LEVELS, _SHARE_LEVELS = 16, 15
+_SMALL_PALETTE = 16  # colours of a picture of four bits
 _HATCH_SCALE, _HATCH_STEP = 3, 11  # pixels of an edge of a cell, and from line to line
 
 
@@ -32,13 +37,9 @@ def _hex(colour: tuple[int, int, int]) -> str:
     return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
-CLASS_LEGEND = tuple((name.replace("_", " "), f"var(--class-{i})") for i, name in enumerate(CLASS_NAMES))
-"""Each class with its colour in whichever palette holds."""
 MASK_LEGEND = ("M (left out)", _hex(MASK_COLOUR))
 POINTLESS_LEGEND = ("in no grid (sky, own vehicle)", _hex(POINTLESS_COLOUR))
 HATCH_LEGEND = ("hatched: ground that no sensor of an input sees", _hex(HATCH_COLOUR))
-LEGEND = (*CLASS_LEGEND, MASK_LEGEND, POINTLESS_LEGEND, HATCH_LEGEND)
-"""Name and colour by class id, then by `MASKED`, `POINTLESS` and `HATCHED`."""
 RIGHT_LEGEND = tuple((name, _hex(colour)) for name, colour in zip(RIGHT_LABELS, RIGHT_COLOURS, strict=True))
 
 
@@ -51,14 +52,33 @@ class Picture:
     uri: str
     kind: PictureKind = "grid"
     lead: bool = True  # whether it is the one to show large
-    colours: frozenset[int] = frozenset()  # which of `LEGEND` appear in it
+    colours: frozenset[int] = frozenset()  # which of `legend` appear in it
 
 
-def grid_picture(
-    title: str, alt: str, grid: Grid, mask: NDArray[np.bool_] | None = None, *, lead: bool = True
-) -> Picture:
-    """Draw a grid (H, W) in the colour-blind-safe class colours, which a page's reader may switch, mask M in white."""
-    return _class_picture(title, alt, Frame(grid, mask).shown, lead=lead)
+def class_legend(classes: ClassSet) -> Legend:
+    """Return each class with its colour in whichever palette holds."""
+    return tuple((name.replace("_", " "), f"var(--class-{i})") for i, name in enumerate(classes.names))
+
+
+def legend(classes: ClassSet) -> Legend:
+    """Return name and colour by class id, then of M, of what gives no point, and of hatching."""
+    return (*class_legend(classes), MASK_LEGEND, POINTLESS_LEGEND, HATCH_LEGEND)
+
+
+def hatched(classes: ClassSet) -> int:
+    """Return the place of hatching in the legend."""
+    return len(legend(classes)) - 1
+
+
+def grid_picture(words: Words, grid: Grid, classes: ClassSet, *, lead: bool = True) -> Picture:
+    """Draw a grid (H, W) in the colour-blind-safe class colours, which a page's reader may switch."""
+    uri, colours = _in_class_colours(grid, classes)
+    return Picture(*words, uri, "grid", lead, colours)
+
+
+def masked_picture(words: Words, grid: Grid, mask: NDArray[np.bool_], classes: ClassSet) -> Picture:
+    """Draw a grid (H, W) likewise, and mask M in white."""
+    return grid_picture(words, Frame(grid, mask).shown(classes), classes)
 
 
 @dataclass(frozen=True)
@@ -68,29 +88,29 @@ class Frame:
     grid: Grid
     mask: NDArray[np.bool_] | None = None
 
-    @property
-    def shown(self) -> Grid:
-        """The grid with its mask."""
-        return self.grid if self.mask is None else np.where(self.mask, MASKED, self.grid).astype(np.uint8)
+    def shown(self, classes: ClassSet) -> Grid:
+        """Return the grid with its mask, in ids of the legend."""
+        return self.grid if self.mask is None else np.where(self.mask, classes.count, self.grid).astype(np.uint8)
 
 
-def strip_picture(title: str, frames: Sequence[Frame | None]) -> Picture:
+def strip_picture(title: str, frames: Sequence[Frame | None], classes: ClassSet) -> Picture:
     """Draw the grids of moments side by side, light gray where there is none."""
     shape = next((frame.grid.shape for frame in frames if frame is not None), (1, 1))
-    nothing = np.full(shape, POINTLESS, np.uint8)
-    shown = [nothing if frame is None else frame.shown for frame in frames]
-    return _class_picture(title, f"{title}, at each moment", np.concatenate(shown, axis=1))
+    nothing = np.full(shape, classes.count + 1, np.uint8)
+    shown = [nothing if frame is None else frame.shown(classes) for frame in frames]
+    return grid_picture((title, f"{title}, at each moment"), np.concatenate(shown, axis=1), classes)
 
 
-def label_picture(title: str, alt: str, label: bytes, class_by_label: Grid) -> Picture:
+def label_picture(words: Words, label: bytes, grid: GridConfig) -> Picture:
     """Make the picture of a label image, a PNG file of ids, in the colours of grids, what is in no grid in light gray.
 
     Raises:
         InputError: the file is damaged or too large.
     """
-    classes = class_by_label[decode_ids(label)]
-    shown = np.where(classes == NO_POINT, POINTLESS, classes).astype(np.uint8)
-    return _class_picture(title, alt, shown, "labels")
+    seen = grid.class_by_label()[decode_ids(label)]
+    shown = np.where(seen == NO_POINT, grid.classes.count + 1, seen).astype(np.uint8)
+    uri, colours = _in_class_colours(shown, grid.classes)
+    return Picture(*words, uri, "labels", colours=colours)
 
 
 def hatch_png(cells: NDArray[np.bool_]) -> bytes:
@@ -103,12 +123,12 @@ def hatch_png(cells: NDArray[np.bool_]) -> bytes:
     return _png(line.astype(np.uint8), np.array([HATCH_COLOUR, HATCH_COLOUR], np.uint8), bits=1, clear=0)
 
 
-def certainty_png(certainty: Grid) -> bytes:
-    """Draw certainty (H, W), 255 = 1.0, from dark (uncertain) to light (certain)."""
+def certainty_png(certainty: Grid, classes: int) -> bytes:
+    """Draw certainty (H, W), 255 = 1.0, of one of so many classes, from dark (uncertain) to light (certain)."""
     levels = np.linspace(0, 1, _CERTAINTY_LEVELS)[:, None]
     palette = np.rint((1 - levels) * (13, 27, 62) + levels * (255, 236, 170)).astype(np.uint8)
     # A maximum over C classes lies between 1/C and 1; that range is what the colours are spread over.
-    scaled = (certainty / 255 - 1 / CLASS_COUNT) / (1 - 1 / CLASS_COUNT) * (_CERTAINTY_LEVELS - 1)
+    scaled = (certainty / 255 - 1 / classes) / (1 - 1 / classes) * (_CERTAINTY_LEVELS - 1)
     return _png(np.rint(scaled.clip(0, _CERTAINTY_LEVELS - 1)).astype(np.uint8), palette)
 
 
@@ -132,9 +152,11 @@ def data_uri(content: bytes, kind: str = "image/png") -> str:
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
-def _class_picture(title: str, alt: str, shown: Grid, kind: PictureKind = "grid", *, lead: bool = True) -> Picture:
-    palette = np.vstack([class_palette(safe=True), np.array([MASK_COLOUR, POINTLESS_COLOUR], np.uint8)])
-    return Picture(title, alt, data_uri(_png(shown, palette)), kind, lead, frozenset(np.unique(shown).tolist()))
+def _in_class_colours(shown: Grid, classes: ClassSet) -> tuple[str, frozenset[int]]:
+    """Draw ids (H, W) of a legend, and tell which of them there are."""
+    palette = np.vstack([classes.palette(safe=True), np.array([MASK_COLOUR, POINTLESS_COLOUR], np.uint8)])
+    bits = 4 if len(palette) <= _SMALL_PALETTE else 8
+    return data_uri(_png(shown, palette, bits=bits)), frozenset(np.unique(shown).tolist())
 
 
 def _png(indices: Grid, palette: NDArray[np.uint8], *, bits: int = 4, clear: int | None = None) -> bytes:
@@ -146,12 +168,12 @@ def _png(indices: Grid, palette: NDArray[np.uint8], *, bits: int = 4, clear: int
     return stream.getvalue()
 
 
-def class_style() -> str:
-    """Write both palettes as CSS: properties `--class-0`, ..., the paper's under `:root[data-colours=paper]`.
+def class_style(classes: ClassSet) -> str:
+    """Write both palettes as CSS: properties `--class-0`, ..., the paper's, or a set's own, for `data-colours=paper`.
 
     The page's script gives pictures the palette whose properties hold.
     """
-    palettes = {":root": class_palette(safe=True), ":root[data-colours=paper]": class_palette()}
+    palettes = {":root": classes.palette(safe=True), ":root[data-colours=paper]": classes.palette()}
     return "".join(
         f"{selector}{{{';'.join(f'--class-{i}:{_hex(colour)}' for i, colour in enumerate(palette.tolist()))}}}"
         for selector, palette in palettes.items()

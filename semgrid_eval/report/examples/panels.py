@@ -14,6 +14,7 @@ from semgrid_eval.report.tables.numbers import ABSENT, number, plural, signed
 from semgrid_eval.scores.results import WindowRecord, read_predictions, read_windows
 
 _FEWEST_COLUMNS, _MOST_COLUMNS = 4, 6
+_TARGET = ("Target", "Target grid with mask M in white")
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Shown:
     """
 
     def __init__(self, contest: Contest, at: Iterable[int], read: WindowReader = read_windows) -> None:
-        self.contest = contest
+        self.contest, self._classes = contest, contest.model.classes
         self._windows = {i: contest.result.record.windows[i] for i in at}
         asked = (contest.model, *contest.rivals)
         answering = {row.name: row for row in (*asked, *contest.baselines) if row is not None}
@@ -71,7 +72,7 @@ class Shown:
         """Return the inputs and the target; where the contest is about horizons, each row's newest input and answer."""
         yield from self._horizons(i, view) if self.contest.baselines else self._inputs(i, view)
         seen = self._seen[self.contest.model.name][i]
-        target = drawing.grid_picture("Target", "Target grid with mask M in white", seen["target"], seen["mask"] > 0)
+        target = drawing.masked_picture(_TARGET, seen["target"], seen["mask"] > 0, self._classes)
         photos = view.photos(view.window.target_stamp_ns, "at the target's time")
         yield Column("Target", "to be predicted", (*photos, target))
 
@@ -93,7 +94,7 @@ class Shown:
         certainty = mine["certainty"]
         if certainty.min() < certainty.max():  # a baseline is equally certain of everything
             alt = f"Certainty of {model.name}, light is certain"
-            picture = drawing.Picture("", alt, drawing.data_uri(drawing.certainty_png(certainty)))
+            picture = drawing.Picture("", alt, drawing.data_uri(drawing.certainty_png(certainty, self._classes.count)))
             yield Column("Certainty", "light is certain", (picture,), step=False)
 
     def _inputs(self, i: int, view: View) -> Iterator[Column]:
@@ -102,7 +103,7 @@ class Shown:
         sensors, steps = inputs.shape[:2]
         for t, stamp_ns in enumerate(view.window.input_stamps_ns):
             title = f"Input {t + 1} of {steps}"
-            grids = (_input_picture(inputs[s, t], title, names[s] if sensors > 1 else "") for s in range(sensors))
+            grids = (self._input(inputs[s, t], title, names[s] if sensors > 1 else "") for s in range(sensors))
             yield Column(title, view.before(stamp_ns), (*view.photos(stamp_ns, title), *grids))
 
     def _horizons(self, i: int, view: View) -> Iterator[Column]:
@@ -114,7 +115,7 @@ class Shown:
             inputs = self._seen[row.name][i]["inputs"][:, -1]  # (S, H, W)
             title = f"Newest input of {row.name}"
             names = row.record.facts.sensors if len(inputs) > 1 else ("",)
-            grids = [_input_picture(grid, title, name, lead=False) for grid, name in zip(inputs, names, strict=True)]
+            grids = [self._input(grid, title, name, lead=False) for grid, name in zip(inputs, names, strict=True)]
             grids.append(self._prediction(row, i, f"{row.name}{self._iou(row, i)}"))
             if baseline is not None and i in self._answers[baseline.name]:
                 title = f"{baseline.name}{self._iou(baseline, i)}"
@@ -128,7 +129,11 @@ class Shown:
 
     def _prediction(self, row: Row, i: int, title: str, *, lead: bool = True) -> drawing.Picture:
         grid = self._answers[row.name][i]["prediction"]
-        return drawing.grid_picture(title, f"Prediction of {row.name}", grid, lead=lead)
+        return drawing.grid_picture((title, f"Prediction of {row.name}"), grid, self._classes, lead=lead)
+
+    def _input(self, grid: drawing.Grid, title: str, sensor: str, *, lead: bool = True) -> drawing.Picture:
+        words = sensor or "Newest input", f"{title}, {sensor}" if sensor else title
+        return drawing.grid_picture((words[0], f"{words[1]}, aligned to the target"), grid, self._classes, lead=lead)
 
     def _iou(self, row: Row, i: int) -> str:
         value = number(mean_iou(row.shown, self._windows[i]))
@@ -146,6 +151,7 @@ class Shown:
 def draw_examples(shown: Shown, picks: Sequence[Pick], thumbnails: RunThumbnails) -> Iterator[Example]:
     """Draw the chosen windows of a contest, each window once."""
     contest, result = shown.contest, shown.contest.result
+    legend = drawing.legend(classes := contest.model.classes)
     for group in by_window(picks):
         index = group[0].index
         window = result.record.windows[index]
@@ -160,12 +166,7 @@ def draw_examples(shown: Shown, picks: Sequence[Pick], thumbnails: RunThumbnails
             command=thumbnails.command(contest.model, window, result.grid),
             film=film,
             answers=answers,
-            legend=tuple(drawing.LEGEND[i] for i in sorted(colours | ({drawing.HATCHED} if hatching else set()))),
+            legend=tuple(legend[i] for i in sorted(colours | ({drawing.hatched(classes)} if hatching else set()))),
             crops=() if kept is None else view.crops,
             hatching=hatching,
         )
-
-
-def _input_picture(grid: drawing.Grid, title: str, sensor: str, *, lead: bool = True) -> drawing.Picture:
-    name = f"{title}, {sensor}" if sensor else title
-    return drawing.grid_picture(sensor or "Newest input", f"{name}, aligned to the target", grid, lead=lead)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import UNKNOWN
+from semgrid_eval.classes import UNKNOWN, ClassSet
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.report.estimates.bootstrap import Scores
 from semgrid_eval.report.examples.choose import Contest, choose, contests
@@ -57,11 +57,11 @@ class _Plan:
     columns: Sequence[tuple[str, Column]]
     windows: Sequence[WindowRecord]
 
-    def draw(self) -> Reel:
+    def draw(self, classes: ClassSet) -> Reel:
         strips = (
             Strip(
                 f"{window.recording}, frame {window.target_frame}",
-                tuple(strip_picture(name, column(window)) for name, column in self.columns),
+                tuple(strip_picture(name, column(window), classes) for name, column in self.columns),
             )
             for window in self.windows
         )
@@ -101,7 +101,7 @@ def _behind(front: Grid, back: Grid) -> Grid:
     return np.where(front == UNKNOWN, back, front)
 
 
-def make_reel(scores: Scores, rows: Sequence[Row], found: Headline | None) -> Reel | None:
+def make_reel(scores: Scores, rows: Sequence[Row], found: Headline | None, classes: ClassSet) -> Reel | None:
     """Draw the grid of examples, None where nothing was kept that could be shown.
 
     Recordings play over time where several windows of each are scored, else targets from farther and from nearer where
@@ -109,7 +109,7 @@ def make_reel(scores: Scores, rows: Sequence[Row], found: Headline | None) -> Re
     """
     plan = next((_plan(scores, contest, _Kept()) for contest in contests(rows, found)), None)
     with suppress(SemgridError, ValueError, IndexError):  # `failures` names what is damaged
-        return plan.draw() if plan is not None and plan.windows else None
+        return plan.draw(classes) if plan is not None and plan.windows else None
     return None
 
 

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import UNKNOWN
+from semgrid_eval.classes import UNKNOWN, ClassSet
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.report.estimates.streams import Strategy, facts_of, plain_strategy
-from semgrid_eval.report.examples.drawing import Frame, Grid, Picture, strip_picture
+from semgrid_eval.report.examples.drawing import Frame, Grid, strip_picture
 from semgrid_eval.report.examples.reel import MOST_MOMENTS, Reel, Strip
 from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.rows.pairing import HEADLINE
@@ -23,7 +23,7 @@ _HINT = (
 )
 
 
-def stream_reel(found: Sequence[Strategy]) -> Reel | None:
+def stream_reel(found: Sequence[Strategy], classes: ClassSet) -> Reel | None:
     """Draw the newest grid as it is and the best other strategies; None where there is nothing to show."""
     rows = _shown(found)
     try:
@@ -37,13 +37,15 @@ def stream_reel(found: Sequence[Strategy]) -> Reel | None:
     moments = range(start, min(start + MOST_MOMENTS, len(first["evaluated_ns"])))
     since_s = [(first["evaluated_ns"][at] - first["evaluated_ns"][start]) / 1e9 for at in moments]
     measured = [Frame(first["target"][at], first["mask"][at] > 0) for at in moments]
-    pictures = [strip_picture("Measured", measured), *(_answers(row, arrays, moments) for row, arrays in kept)]
+    columns: list[tuple[str, Sequence[Frame | None]]] = [("Measured", measured)]
+    columns += [(row.name, _answers(row, arrays, moments)) for row, arrays in kept]
+    recording = rows[0].results[0].record.windows[0].recording
     return Reel(
         "A recording, time by time",
         _HINT,
-        ("Measured", *(row.name for row in rows)),
+        tuple(name for name, _ in columns),
         tuple(f"{number} of {len(moments)}, {since:.1f} s" for number, since in enumerate(since_s, start=1)),
-        (Strip(rows[0].results[0].record.windows[0].recording, tuple(pictures)),),
+        (Strip(recording, tuple(strip_picture(name, frames, classes) for name, frames in columns)),),
     )
 
 
@@ -56,7 +58,7 @@ def _shown(found: Sequence[Strategy]) -> list[Row]:
     return [row for row in rows if row.targets == rows[0].targets][:_MOST_STRATEGIES]
 
 
-def _answers(row: Row, arrays: Mapping[str, NDArray[Any]], moments: Sequence[int]) -> Picture:
+def _answers(row: Row, arrays: Mapping[str, NDArray[Any]], moments: Sequence[int]) -> list[Frame | None]:
     cell_m = (row.results[0].grid or GridConfig()).spec.cell_m
 
     def at(moment: int) -> Frame | None:
@@ -65,7 +67,7 @@ def _answers(row: Row, arrays: Mapping[str, NDArray[Any]], moments: Sequence[int
         way_m = arrays["evaluated_m"][moment] - arrays["answer_m"][used] if facts_of(row).moved else np.zeros(2)
         return Frame(moved(arrays["prediction"][used], np.rint(way_m / cell_m).astype(np.int64)))
 
-    return strip_picture(row.name, [at(moment) for moment in moments])
+    return [at(moment) for moment in moments]
 
 
 def moved(grid: Grid, cells: NDArray[np.int64]) -> Grid:

@@ -100,7 +100,7 @@ class View:
             yield Picture("Camera", f"Camera image, {moment}", data_uri(files.image, "image/webp"), kind="camera")
         with suppress(InputError):  # there is none, or it is damaged
             title = "Segmentation"
-            yield label_picture(title, f"{title}, {moment}", files.label, self.grid.class_by_label())
+            yield label_picture((title, f"{title}, {moment}"), files.label, self.grid)
 
     def before(self, stamp_ns: int) -> str:
         """Tell how long before the target a time is."""

@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from semgrid_eval.classes import CATEGORY_NAMES
 from semgrid_eval.report.claims.claims import paper_value
-from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, shared_iou
 from semgrid_eval.report.figures import style
 from semgrid_eval.report.rows.pairing import by_question, rows_alike, settings_but
 from semgrid_eval.report.rows.words import question_words
@@ -43,10 +42,11 @@ def category_plots(scores: Scores) -> list[style.Plot]:
     size_in = (_WIDE_IN, _AROUND_IN + _BAR_IN * (max(places) + 1 + _GAP))
     with mpl.rc_context(style.SETTINGS):
         figure = Figure(figsize=size_in, layout="constrained")
-        panels = figure.subplots(1, len(CATEGORY_NAMES), sharey=True)
+        names = shared_iou(scores.values()).classes.category_names
+        panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
         colours = style.family_colours(entry.row for entry in scores.values() if not entry.row.uses_truth)
         strokes = style.truth_strokes(entry.row for entry in scores.values())
-        for axes, category in zip(panels, CATEGORY_NAMES, strict=True):
+        for axes, category in zip(panels, names, strict=True):
             reach = _panel(axes, scores, category, groups, colours)
             reach = max([reach, *_draw_told(axes, category, groups, strokes)])
             axes.set_xlim(0, _ROOM * max(reach, 1e-3))
@@ -83,7 +83,7 @@ def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group], c
     for name, place in (item for group in groups for item in group.places.items()):
         entry = scores[name]
         longest = max(longest, _bar(axes, entry, category, place, colours[entry.row.record.facts.family]))
-    axes.set_title(LABELS[category], loc="left", fontweight="bold")
+    axes.set_title(shared_iou(scores.values()).labels[category], loc="left", fontweight="bold")
     axes.set_xlabel("IoU")
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
@@ -105,7 +105,7 @@ def _draw_told(axes: Axes, category: str, groups: Sequence[Group], strokes: Mapp
 
 def _bar(axes: Axes, entry: RowScores, category: str, place: float, colour: str) -> float:
     """Draw a bar with its interval, the paper's value, and its number at the right edge; return how far it reaches."""
-    estimate, paper = entry.estimate(category), paper_value(entry.row.record.name, category)
+    estimate, paper = entry.estimate(category), paper_value(entry.row, category)
     axes.barh(place, np.nan_to_num(estimate.value), 0.78, color=colour)
     if np.isfinite(estimate.low):
         axes.plot([estimate.low, estimate.high], [place, place], color=style.INK, linewidth=1)
@@ -152,11 +152,13 @@ def horizon_plots(scores: Scores) -> list[style.Plot]:
     drawn = {entry.row.name: entry for line in lines for entry in line}
     with mpl.rc_context(style.SETTINGS):
         figure = Figure(figsize=(11.3, 3.0), layout="constrained")
-        for axes, category in zip(figure.subplots(1, len(CATEGORY_NAMES), sharex=True), CATEGORY_NAMES, strict=True):
+        iou = shared_iou(drawn.values())
+        names = iou.classes.category_names
+        for axes, category in zip(figure.subplots(1, len(names), sharex=True, squeeze=False)[0], names, strict=True):
             for index, line in enumerate(lines):
                 colour = style.INK if line[0].row.uses_truth else style.PALETTE[index % len(style.PALETTE)]
                 _line(axes, line, category, colour)
-            axes.set_title(LABELS[category], loc="left", fontweight="bold")
+            axes.set_title(iou.labels[category], loc="left", fontweight="bold")
             axes.set_xticks(leads := sorted({_lead_s(e) for e in drawn.values()}), [f"{lead:.2f}" for lead in leads])
             axes.margins(x=0.12)
         figure.axes[0].set_ylabel("IoU")
@@ -178,7 +180,7 @@ def _line(axes: Axes, line: Sequence[RowScores], category: str, colour: str) -> 
     ]
     low, high = [e.low for e in estimates], [e.high for e in estimates]
     drawn.append(axes.fill_between(leads, low, high, color=colour, alpha=0.18, linewidth=0))
-    papers = [paper_value(entry.row.record.name, category) for entry in line]
+    papers = [paper_value(entry.row, category) for entry in line]
     drawn += axes.plot(leads, papers, "D", markersize=4, **(style.PAPER_MARKS | {"markeredgecolor": colour}))
     style.mark([entry.row for entry in line], *drawn)
 

@@ -8,10 +8,10 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from semgrid_eval.report.estimates.bootstrap import LABELS, Parts, RowScores
+from semgrid_eval.report.estimates.bootstrap import Parts, RowScores, shared_iou
 from semgrid_eval.report.figures import style
 from semgrid_eval.report.rows.load import Row
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, main_group, rows_alike
+from semgrid_eval.report.rows.pairing import main_group, rows_alike
 
 _CAPTION = "IoU by distance from the vehicle, with 95% intervals, of the rows that are asked the same as most others"
 
@@ -21,14 +21,14 @@ def distance_plots(parts: Parts, rows: Sequence[Row]) -> list[style.Plot]:
     lines = _lines(parts, rows)
     if not lines or len(parts) < 2:
         return []
-    strokes = _strokes(lines)
+    strokes, iou = _strokes(lines), shared_iou([line[0] for line in lines])
     with mpl.rc_context(style.SETTINGS):
         figure = Figure(figsize=(11.3, 2.7), layout="constrained")
-        panels = figure.subplots(1, len(DIFFERENCE_COLUMNS), sharex=True)
-        for axes, column in zip(panels, DIFFERENCE_COLUMNS, strict=True):
+        panels = figure.subplots(1, len(iou.compared), sharex=True)
+        for axes, column in zip(panels, iou.compared, strict=True):
             for line, stroke in zip(lines, strokes, strict=True):
                 _draw(axes, line, column, stroke)
-            axes.set_title(LABELS[column], loc="left", fontweight="bold")
+            axes.set_title(iou.labels[column], loc="left", fontweight="bold")
             axes.set_xticks(range(len(parts)), [_short_band(name) for name in parts], fontsize=7)
         panels[0].set_ylabel("IoU")
         legend = panels[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, MASK_COLOUR, class_palette
+from semgrid_eval.classes import DEFAULT_CLASSES, MASK_COLOUR, ClassSet
 from semgrid_eval.grids.spec import GridSpec
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ def draw_grid(
     *,
     mask: NDArray[np.bool_] | None = None,
     spec: GridSpec | None = None,
+    classes: ClassSet = DEFAULT_CLASSES,
     axes: "Axes | None" = None,
 ) -> "Axes":
     """Draw a grid (H, W) of class ids in the colour-blind-safe colours, mask M (H, W) in white.
@@ -26,8 +27,8 @@ def draw_grid(
     """
     spec = spec or GridSpec(rows=grid.shape[0], columns=grid.shape[1])
     axes = Figure(layout="constrained").add_subplot() if axes is None else axes
-    palette = np.vstack([class_palette(safe=True), np.array([MASK_COLOUR], np.uint8)])
-    shown = grid if mask is None else np.where(mask, CLASS_COUNT, grid)
+    palette = np.vstack([classes.palette(safe=True), np.array([MASK_COLOUR], np.uint8)])
+    shown = grid if mask is None else np.where(mask, classes.count, grid)
     left_m, right_m = spec.agent_column * spec.cell_m, (spec.agent_column - spec.columns) * spec.cell_m
     back_m, ahead_m = (spec.agent_row - spec.rows) * spec.cell_m, spec.agent_row * spec.cell_m
     axes.imshow(palette[shown], extent=(left_m, right_m, back_m, ahead_m), interpolation="nearest")

@@ -8,7 +8,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, shared_iou
 from semgrid_eval.report.estimates.streams import Strategy, facts_of, record_of
 from semgrid_eval.report.figures.style import SETTINGS, Plot, evidence, finish, line_style, mark, mark_legend, short
 from semgrid_eval.report.rows.pairing import HEADLINE
@@ -23,7 +23,8 @@ STREAM_COLUMNS = ("row", "strategy", "added_ms", "delay_ms", "age_ms", "lead_ms"
 
 def stream_frame(found: Sequence[Strategy]) -> pd.DataFrame:
     """Return one line for each row with a stream: its strategy, its times and its categories."""
-    columns = [name for name in LABELS if name.endswith(("known", "static", "dynamic")) or name == "vehicles"]
+    iou = shared_iou(each.measured for each in found)
+    columns = [name for name in iou.labels if name not in iou.classes.names[1:]]
     lines = [
         {
             "row": entry.row.name,
@@ -47,16 +48,17 @@ def stream_plots(found: Sequence[Strategy], moving: Scores) -> list[Plot]:
     curves = [each for each in found if len(each.entries) > 1]
     if not curves:
         return []
+    iou = shared_iou(each.measured for each in curves)
     panels = [("all cells", HEADLINE, {entry.row.name: entry for each in curves for entry in each.entries})]
-    if moving:
-        panels.append(("near moving actors", "vehicles", dict(moving)))
+    if moving and iou.moving:
+        panels.append(("near moving actors", iou.moving[0], dict(moving)))
     with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=(5.2 * len(panels), 3.8), layout="constrained")
         places = figure.subplots(1, len(panels), squeeze=False)[0]
         for axes, (where, column, scores) in zip(places, panels, strict=True):
             for index, strategy in enumerate(curves):
                 _draw(axes, strategy, scores, column, index)
-            axes.set(xlabel="delay of answers, ms", ylabel="streaming IoU", title=f"{LABELS[column]}, {where}")
+            axes.set(xlabel="delay of answers, ms", ylabel="streaming IoU", title=f"{iou.labels[column]}, {where}")
         legend = figure.axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
         shown = (each for each in curves if any(entry.row.name in panels[-1][2] for entry in each.entries))
         mark_legend(legend, [[each.measured.row] for each in shown])

@@ -16,7 +16,7 @@ from matplotlib.legend import Legend
 from PIL import Image
 
 from semgrid_eval.errors import printable
-from semgrid_eval.report.claims.claims import in_paper
+from semgrid_eval.report.claims.claims import is_papers
 from semgrid_eval.report.estimates.bootstrap import Scores
 from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.tables.numbers import plural
@@ -101,7 +101,7 @@ def evidence(scores: Scores) -> str:
 
 def paper_note(scores: Scores) -> str:
     """End a caption, saying what the diamonds are where the paper has any of the rows."""
-    beside = any(in_paper(entry.row.record.name) for entry in scores.values())
+    beside = any(is_papers(entry.row) for entry in scores.values())
     return "; diamonds are the paper's values, on Cityscapes." if beside else "."
 
 

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from math import ceil, floor, isfinite
 
 from semgrid_eval.report.claims.claims import paper_value
-from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, shared_iou
 from semgrid_eval.report.figures.categories import lay_out
 from semgrid_eval.report.figures.style import family_colours
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS
 from semgrid_eval.report.rows.words import model_words
 from semgrid_eval.report.tables.numbers import number
 from semgrid_eval.report.tables.values import best_rows, evidence
@@ -78,8 +77,9 @@ class _Axis:
 
 def draw_chart(scores: Scores) -> Chart:
     """Lay the figure out: rows that are asked the same stand together, baselines first, who is told the truth last."""
-    axes = {column: _axis(scores, column) for column in DIFFERENCE_COLUMNS}
-    best = {column: best_rows(scores, column) for column in DIFFERENCE_COLUMNS}
+    iou = shared_iou(scores.values())
+    axes = {column: _axis(scores, column) for column in iou.compared}
+    best = {column: best_rows(scores, column) for column in iou.compared}
     colours = family_colours(entry.row for entry in scores.values() if not entry.row.uses_truth)
 
     def entry(name: str) -> Entry:
@@ -92,7 +92,7 @@ def draw_chart(scores: Scores) -> Chart:
         fresh = [each.row.name for each in group.told if each.row.name not in told]
         told.update(fresh)  # they stand in the first group that they belong to
         groups.append((group.words, tuple(map(entry, (*group.places, *fresh)))))
-    ends = tuple((LABELS[column], f"{axis.low:.2f} to {axis.high:.2f}") for column, axis in axes.items())
+    ends = tuple((iou.labels[column], f"{axis.low:.2f} to {axis.high:.2f}") for column, axis in axes.items())
     paper = any(mark.paper is not None for _, entries in groups for each in entries for mark in each.marks)
     return Chart(ends, tuple(groups), _codes(scores, colours), paper)
 
@@ -101,14 +101,14 @@ def _axis(scores: Scores, column: str) -> _Axis:
     """Reach from the lowest to the highest of all values, their intervals and the paper's values."""
     found = [entry.estimate(column) for entry in scores.values()]
     values = [value for each in found for value in (each.value, each.low, each.high)]
-    values += [paper_value(entry.row.record.name, column) for entry in scores.values()]
+    values += [paper_value(entry.row, column) for entry in scores.values()]
     known = [value for value in values if isfinite(value)] or [0.0]
     low = floor(min(known) / _STEP) * _STEP
     return _Axis(low, max(low + _STEP, ceil(max(known) / _STEP) * _STEP))
 
 
 def _mark(entry: RowScores, column: str, axis: _Axis, best: bool) -> Mark:
-    estimate, paper = entry.estimate(column), paper_value(entry.row.record.name, column)
+    estimate, paper = entry.estimate(column), paper_value(entry.row, column)
     title = evidence(entry, column) + (f"; the paper's value, on Cityscapes: {number(paper)}" * isfinite(paper))
     places = (axis.place(value) for value in (estimate.value, estimate.low, estimate.high, paper))
     return Mark(number(estimate.value), title, best, *places)

@@ -3,15 +3,18 @@
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from semgrid_eval.classes import ClassSet
 from semgrid_eval.report.claims.claims import on_cityscapes
 from semgrid_eval.report.claims.findings import Finding, find
 from semgrid_eval.report.estimates.bootstrap import (
     Everything,
     Resampling,
     Scores,
+    classes_of,
     everywhere,
     score_all,
     score_regions,
+    shared_iou,
 )
 from semgrid_eval.report.estimates.division import of_cells
 from semgrid_eval.report.estimates.leads import best_leads, lead_series
@@ -29,7 +32,7 @@ from semgrid_eval.report.tables.scores import division_tables, score_tables
 from semgrid_eval.report.tables.streams import lead_table, stream_table, wins_table
 from semgrid_eval.report.tables.table import Table
 from semgrid_eval.report.tables.truth import expected_table, order_sentence, way_table
-from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores.metrics.table import iou_of
 from semgrid_eval.scores.regions.distance import DISTANCE
 from semgrid_eval.scores.regions.table import PARTITIONS
 
@@ -51,6 +54,11 @@ class Material:
     same: Mapping[str, str]  # rows that are left out of tables and figures, since they are another one by another name
     streams: Sequence[Strategy] = ()
     best_leads: Mapping[str, float] = field(default_factory=dict)  # in ms by category
+
+    @property
+    def classes(self) -> ClassSet:
+        """The classes of all rows."""
+        return shared_iou(self.scores.values()).classes
 
 
 def gather(runs: Sequence[Run], resampling: Resampling) -> Material:
@@ -122,4 +130,5 @@ def without(everything: Everything, hidden: Container[str]) -> Everything:
 def score_expected(rows: Sequence[Row], resampling: Resampling) -> Everything:
     """Score rows against what is measured on average, of all cells and near actors."""
     parts = [of_cells(PARTITIONS[name]) for name in ("all", "actors")]
-    return {"iou": {part.name: score_regions(against_expected(rows), IOU, part, resampling) for part in parts}}
+    iou = iou_of(classes_of(rows))
+    return {"iou": {part.name: score_regions(against_expected(rows), iou, part, resampling) for part in parts}}

@@ -7,10 +7,10 @@ from math import isfinite
 from markupsafe import Markup
 
 from semgrid_eval.errors import printable
-from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, Scores
+from semgrid_eval.report.estimates.bootstrap import Estimate, Scores, shared_iou
 from semgrid_eval.report.estimates.streams import Strategy
 from semgrid_eval.report.rows.load import Row, Run, comparable, key_of
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, VERDICTS, Headline, verdict
+from semgrid_eval.report.rows.pairing import HEADLINE, VERDICTS, Headline, verdict
 from semgrid_eval.report.rows.words import otherwise_asked, question_words
 from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, plural, signed
 from semgrid_eval.report.tables.streams import stream_sentence
@@ -136,14 +136,15 @@ def _doubt(recordings: int, seeds: Sequence[int]) -> str:
 
 
 def _tiles(scores: Scores, best: Row, rival: Row) -> tuple[Tile, ...]:
+    iou = shared_iou(scores.values())
     differences: Mapping[str, Estimate] = {
-        column: scores[best.name].minus(scores[rival.name], column) for column in DIFFERENCE_COLUMNS
+        column: scores[best.name].minus(scores[rival.name], column) for column in iou.compared
     }
     bounds = [abs(v) for d in differences.values() for v in (d.value, d.low, d.high) if isfinite(v)]
     reach = 1.1 * max([*bounds, 1e-3])
     results = " and ".join(f"{plural(len(row.results), 'result')} of {row.name}" for row in (best, rival))
     behind = f"{results}, {plural(best.windows, 'window')}"
-    return tuple(_tile(LABELS[column], difference, reach, behind) for column, difference in differences.items())
+    return tuple(_tile(iou.labels[column], difference, reach, behind) for column, difference in differences.items())
 
 
 def _tile(label: str, difference: Estimate, reach: float, behind: str) -> Tile:

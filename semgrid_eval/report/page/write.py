@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from semgrid_eval import __version__
+from semgrid_eval.classes import DEFAULT_CLASSES
 from semgrid_eval.errors import InputError, printable
 from semgrid_eval.files import atomic_folder, locked
 from semgrid_eval.progress import Progress, silent
@@ -16,7 +17,7 @@ from semgrid_eval.report.claims.claims import MARGIN
 from semgrid_eval.report.claims.findings import Finding, finding_table, missing_table, sentence
 from semgrid_eval.report.estimates.bootstrap import SEED, Level, Parts, Resampling
 from semgrid_eval.report.estimates.paces import EDGES_MPS
-from semgrid_eval.report.examples.drawing import CLASS_LEGEND, MASK_LEGEND, RIGHT_LEGEND, SHARE_ENDS, class_style
+from semgrid_eval.report.examples.drawing import MASK_LEGEND, RIGHT_LEGEND, SHARE_ENDS, class_legend, class_style
 from semgrid_eval.report.examples.errors import FEWEST_WINDOWS, error_maps
 from semgrid_eval.report.examples.gallery import example_groups, gaps, widths
 from semgrid_eval.report.examples.reel import make_reel
@@ -107,10 +108,11 @@ def render_page(material: Material) -> str:
 def _frame(material: Material) -> dict[str, Any]:
     """Return what the page is made with, and what its parts share."""
     return {
-        "style": Markup(class_style()) + _source("style.css") + _source("examples.css"),
+        "style": Markup(class_style(material.classes)) + _source("style.css") + _source("examples.css"),
         "script": Markup().join(map(_source, ("page.js", "chooser.js", "examples.js", "reel.js", "colours.js"))),
         "version": __version__,
         "runs": material.runs,
+        "own_classes": material.classes != DEFAULT_CLASSES,
         "title": title_of(material.runs),
         "axes": chooser_axes(material.runs),
         "names": {row.number: row.name for run in material.runs for row in run.rows if row.results},
@@ -134,11 +136,11 @@ def _pictures(material: Material, found: Headline | None) -> dict[str, Any]:
     examples = example_groups(material.runs, rows, shown)
     return {
         "examples": examples,
-        "reel": make_reel(material.scores, rows, shown),
-        "stream_reel": stream_reel(material.streams),
+        "reel": make_reel(material.scores, rows, shown, material.classes),
+        "stream_reel": stream_reel(material.streams, material.classes),
         "gaps": gaps(rows, examples),
         "widths": widths(rows),
-        "legend": (*CLASS_LEGEND, MASK_LEGEND),
+        "legend": (*class_legend(material.classes), MASK_LEGEND),
         "right_legend": RIGHT_LEGEND,
         "errors": error_maps(rows),
         "share_ends": SHARE_ENDS,

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, ResultError, SemgridError, first_line
 from semgrid_eval.grids.spec import GridConfig
@@ -40,6 +41,11 @@ class Result:
         counts = self.read("iou", "all")
         assert counts is not None  # all cells are always counted
         return counts[:, 0]
+
+    @cached_property
+    def classes(self) -> ClassSet:
+        """The classes of its grids."""
+        return self.record.classes
 
     @cached_property
     def recordings(self) -> tuple[NDArray[np.str_], NDArray[np.int64]]:
@@ -78,6 +84,11 @@ class Row:
     groups: Mapping[str, str] = field(default_factory=dict)  # by a log's path
     faults: tuple[str, ...] = ()  # those of the failures that are faults of its files
     number: int = 0  # its place in the report, counted through all runs from 1
+
+    @property
+    def classes(self) -> ClassSet:
+        """The classes of its grids; the default ones where it has no result."""
+        return self.results[0].classes if self.results else DEFAULT_CLASSES
 
     @property
     def is_left(self) -> bool:
@@ -278,10 +289,10 @@ class _Loader:
     def _result(self, folder: Path) -> Result:
         record = files.read_result(folder)
         windows = self._windows.setdefault(record.windows, record.windows)
-        files.check_sums(folder, len(windows), has_expected=record.has_expected)
+        files.check_sums(folder, len(windows), record.classes, has_expected=record.has_expected)
         shared = record.model_copy(update={"windows": windows})
         expected = None
         if record.has_expected:
-            expected = partial(files.read_sums, folder, file=files.EXPECTED_FILE, verify=False)
-        sums = partial(files.read_sums, folder, verify=False)
+            expected = partial(files.read_sums, folder, classes=record.classes, file=files.EXPECTED_FILE, verify=False)
+        sums = partial(files.read_sums, folder, classes=record.classes, verify=False)
         return Result(shared, sums, files.read_history(folder), folder, expected)

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from semgrid_eval.classes import MEAN_KNOWN
 from semgrid_eval.report.estimates.bootstrap import Estimate, Scores
 from semgrid_eval.report.rows.load import Row, comparable, key_of
 
-HEADLINE = "mean_known"
-DIFFERENCE_COLUMNS = (HEADLINE, "static_known", "small_static", "vehicles", "small_dynamic")
+HEADLINE = MEAN_KNOWN
 _UNSET = "not set"
 _OF_TARGETS = ("grid.", "window.", "validation_window", "validation_split", "train_split", "hold_out", "mask_mode")
 """Starts of the keys of settings that decide the targets; with `hold_out`, what is scored is of `train_split`."""

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, shared_iou
 from semgrid_eval.report.rows.load import Row, comparable
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, settings_of
+from semgrid_eval.report.rows.pairing import settings_of
 from semgrid_eval.report.tables.numbers import interval_phrase, plural
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
 from semgrid_eval.report.tables.values import evidence
@@ -22,7 +22,8 @@ def disturbance_table(scores: Scores) -> Table | None:
         if entry.row.disturbed and (base := undisturbed(entry.row, [other.row for other in scores.values()])):
             disturbed.setdefault(base.name, []).append(entry)
     cards = tuple(_card(scores[name], entries) for name, entries in disturbed.items())
-    columns = tuple((LABELS[column], "") for column in DIFFERENCE_COLUMNS)
+    iou = shared_iou(scores.values())
+    columns = tuple((iou.labels[column], "") for column in iou.compared)
     return Table("disturbances", _CAPTION, "Inputs", columns, cards) if cards else None
 
 
@@ -38,7 +39,7 @@ def _settings_but_disturbance(row: Row) -> dict[str, object]:
 
 
 def _card(base: RowScores, entries: Sequence[RowScores]) -> tuple[Line, ...]:
-    values = tuple(value_cell(base.estimate(name), title=evidence(base, name)) for name in DIFFERENCE_COLUMNS)
+    values = tuple(value_cell(base.estimate(name), title=evidence(base, name)) for name in shared_iou([base]).compared)
     head = Line(base.row.name, values, title=base.row.record.label, row=base.row.number)
     return (
         head,
@@ -48,7 +49,7 @@ def _card(base: RowScores, entries: Sequence[RowScores]) -> tuple[Line, ...]:
 
 def _losses(entry: RowScores, base: RowScores) -> tuple[Cell, ...]:
     found = []
-    for column in DIFFERENCE_COLUMNS:
+    for column in shared_iou([base]).compared:
         difference = entry.minus(base, column)
         behind = f"{plural(entry.row.windows, 'window')}; {interval_phrase(difference, with_sign=True)}"
         found.append(difference_cell(difference, title=f"{evidence(entry, column)}; {behind}"))

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.report.estimates.bootstrap import LABELS, Everything, Parts, RowScores, Scores, everywhere
+from semgrid_eval.classes import known_name
+from semgrid_eval.report.estimates.bootstrap import Everything, Parts, RowScores, Scores, everywhere, shared_iou
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division
 from semgrid_eval.report.rows.load import Row, comparable
 from semgrid_eval.report.rows.pairing import (
-    DIFFERENCE_COLUMNS,
     HEADLINE,
     changed_settings,
     settings_of,
@@ -20,9 +19,9 @@ from semgrid_eval.report.tables.numbers import ABSENT, MINUS, interval_phrase, n
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, plain_table
 from semgrid_eval.report.tables.targets import not_compared_table
 from semgrid_eval.report.tables.values import difference_table, run_differences, side_by_side, value_table
-from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS, MERGED_COLUMNS
+from semgrid_eval.scores.metrics.iou import Iou
 from semgrid_eval.scores.metrics.metric import Metric, divided
-from semgrid_eval.scores.metrics.table import IOU, METRICS
+from semgrid_eval.scores.metrics.table import IOU, metrics_of
 
 _PAPER = (
     " The paper's values (Table A1) come from Cityscapes' validation set; "
@@ -30,11 +29,8 @@ _PAPER = (
 )
 _CATEGORIES = "Category scores: mean of the class IoUs, with 95% interval. Best of each column in bold."
 _CLASSES = "Class IoU with 95% interval."
-_SHOWN = (HEADLINE, *(name for name in CATEGORY_COLUMNS if name != HEADLINE))
-_MERGED = (
-    "Category scores after merging the classes of a category, as the Cityscapes benchmark does. "
-    "It leaves void out, as Static (known, merged) leaves out unknown."
-)
+_MERGED = "Category scores after merging the classes of a category, as the Cityscapes benchmark does."
+_VOID = " It leaves void out, as {} leaves out unknown."
 
 
 def score_tables(scores: Scores, tags: Sequence[str], on_cityscapes: Collection[Path] = ()) -> dict[str, Table | None]:
@@ -47,25 +43,34 @@ def score_tables(scores: Scores, tags: Sequence[str], on_cityscapes: Collection[
     """
     in_runs = f"The same rows in several runs: differences to {tags[0] if tags else 'the first run'}."
     paper = _PAPER * bool(on_cityscapes)
+    iou = shared_iou(scores.values())
+    names, shown = iou.classes.names, (HEADLINE, *(name for name in iou.category_columns if name != HEADLINE))
     return {
-        "categories": value_table("categories", _CATEGORIES + paper, scores, _SHOWN, on_cityscapes=on_cityscapes),
-        "differences": difference_table("differences", _to_baseline("category"), scores, DIFFERENCE_COLUMNS),
-        "class_differences": difference_table("class-differences", _to_baseline("class"), scores, CLASS_NAMES),
-        "classes": value_table("classes", _CLASSES + paper, scores, CLASS_NAMES, on_cityscapes=on_cityscapes),
+        "categories": value_table("categories", _CATEGORIES + paper, scores, shown, on_cityscapes=on_cityscapes),
+        "differences": difference_table("differences", _to_baseline("category"), scores, iou.compared),
+        "class_differences": difference_table("class-differences", _to_baseline("class"), scores, names),
+        "classes": value_table("classes", _CLASSES + paper, scores, names, on_cityscapes=on_cityscapes),
         "changes": changes_table(scores),
         "disturbances": disturbance_table(scores),
         "not_compared": not_compared_table(scores),
-        "merged": value_table("merged", _MERGED, scores, MERGED_COLUMNS),
-        "runs": run_differences("runs", in_runs, scores, DIFFERENCE_COLUMNS),
+        "merged": value_table("merged", _MERGED + _void(iou), scores, iou.merged_columns),
+        "runs": run_differences("runs", in_runs, scores, iou.compared),
         "costs": cost_table(list(scores.values())),
     }
+
+
+def _void(iou: Iou) -> str:
+    """Say which figure leaves `unknown` out, where that is in a category."""
+    left_out = (f"merged_{known_name(name)}" for name in iou.classes.category_names)
+    return "".join(_VOID.format(iou.labels[name]) for name in left_out if name in iou.labels)
 
 
 def confusion_table(entry: RowScores, name: str) -> Table:
     """Show how the target's classes are predicted: shares of each target class, pooled over windows and seeds."""
     counts = entry.totals.sum(axis=0)
     shares = divided(counts, np.broadcast_to(counts.sum(axis=1, keepdims=True), counts.shape))
-    labels = [LABELS[name] for name in CLASS_NAMES]
+    iou = shared_iou([entry])
+    labels = [iou.labels[name] for name in iou.classes.names]
     lines = []
     for target, of_target, counted in zip(labels, shares.tolist(), counts.tolist(), strict=True):
         cells = [_share_cell(*each, target) for each in zip(of_target, counted, labels, strict=True)]
@@ -114,12 +119,13 @@ def _to_baseline(kind: str) -> str:
 
 def division_tables(everything: Everything, divisions: Sequence[Division]) -> dict[str, list[Table]]:
     """Make the tables by division; one whose regions nobody knows has none."""
-    rows = [entry.row for entry in everywhere(everything, IOU.name).values()]
+    scores = everywhere(everything, IOU.name).values()
+    rows, metrics = [entry.row for entry in scores], metrics_of(shared_iou(scores).classes)
     return {
         division.name: [
             table
-            for metric in METRICS.values()
-            if not (metric is IOU and division.name == EVERYWHERE.name)  # which has tables of its own
+            for metric in metrics.values()
+            if not (metric.name == IOU.name and division.name == EVERYWHERE.name)  # which has tables of its own
             for table in _tables(metric, division, everything[metric.name][division.name], rows)
         ]
         for division in divisions
@@ -127,10 +133,10 @@ def division_tables(everything: Everything, divisions: Sequence[Division]) -> di
 
 
 def _tables(metric: Metric, division: Division, parts: Parts, rows: Sequence[Row]) -> list[Table]:
-    columns = division.columns(metric)
+    columns = division.shown(metric)
     if not columns or not parts:
         return []
-    name = division.name if metric is IOU else f"{division.name}-{metric.name}"
+    name = division.name if metric.name == IOU.name else f"{division.name}-{metric.name}"
     what = f"{metric.title} {division.words}".rstrip()
     others = " Rows with other inputs have other cells here and are not compared." if division.by_inputs else ""
     values = f"{what}, with 95% interval. Best of each in bold.{others}"
@@ -145,19 +151,20 @@ def _tables(metric: Metric, division: Division, parts: Parts, rows: Sequence[Row
 def changes_table(scores: Scores) -> Table | None:
     """Show what each row changes against the row of its model above it that it is closest to, and what that does."""
     entries, lines = list(scores.values()), []
+    iou = shared_iou(entries)
     for at, entry in enumerate(entries):
         base = _closest(entry, entries[:at])
         changed = changed_settings(settings_of(base.row), settings_of(entry.row)).values() if base else ()
         if base is None or not changed:
             continue
-        cells = (Cell("; ".join(changed)), *(_change(entry, base, column) for column in DIFFERENCE_COLUMNS))
+        cells = (Cell("; ".join(changed)), *(_change(entry, base, column) for column in iou.compared))
         sign = MINUS if comparable(entry.row, base.row) else "beside"
         lines.append(Line(f"{entry.row.name} {sign} {base.row.name}", cells, row=entry.row.number))
     caption = (
         "What each row changes against the row above it that has the same model and the fewest other settings, "
         "and the difference of their scores. Where the targets are others, both scores are shown instead."
     )
-    columns = ["Settings", *(LABELS[column] for column in DIFFERENCE_COLUMNS)]
+    columns = ["Settings", *(iou.labels[column] for column in iou.compared)]
     return plain_table("changes", caption, "Rows", columns, lines) if lines else None
 
 

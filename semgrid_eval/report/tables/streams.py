@@ -3,15 +3,15 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from semgrid_eval.report.estimates.bootstrap import LABELS, Estimate, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores, shared_iou
 from semgrid_eval.report.estimates.leads import LeadSeries
 from semgrid_eval.report.estimates.streams import Strategy, facts_of, pairs_with, plain_strategy, record_of, won_ms
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, VERDICTS, verdict
+from semgrid_eval.report.rows.pairing import HEADLINE, VERDICTS, verdict
 from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, signed
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
 from semgrid_eval.report.tables.values import evidence
 
-_MOVING = ("vehicles", "person")
+_MOVING = 2  # figures of what moves that are shown
 _STREAMS = (
     "Streaming IoU: at each time of evaluation, the newest grid that was published by then against what is measured at "
     "that time; with 95% interval. Latency: from the beginning of the work on a frame to its answer, median. Age: from "
@@ -34,16 +34,19 @@ def stream_table(found: Sequence[Strategy], warm: Scores, moving: Scores) -> Tab
     """Show every strategy at its least delay; None where there is no stream."""
     if not found:
         return None
-    columns = [(LABELS[column], "") for column in DIFFERENCE_COLUMNS]
-    columns += [("Mean", "after the warm-up"), *((LABELS[column], "near moving actors") for column in _MOVING)]
+    iou = shared_iou(each.measured for each in found)
+    columns = [(iou.labels[column], "") for column in iou.compared]
+    columns += [("Mean", "after the warm-up")]
+    columns += [(iou.labels[column], "near moving actors") for column in iou.moving[:_MOVING]]
     columns += [("Latency", "ms"), ("Age", "ms"), ("Lead", "ms"), ("Misses", "")]
     return Table("streams", _STREAMS, "Strategy", tuple(columns), tuple((_line(each, warm, moving),) for each in found))
 
 
 def _line(strategy: Strategy, warm: Scores, moving: Scores) -> Line:
     entry, record = strategy.measured, record_of(strategy.measured.row)
-    cells = [_value(entry, column) for column in DIFFERENCE_COLUMNS]
-    cells += [_found(warm, entry, HEADLINE), *(_found(moving, entry, column) for column in _MOVING)]
+    iou = shared_iou([entry])
+    cells = [_value(entry, column) for column in iou.compared]
+    cells += [_found(warm, entry, HEADLINE), *(_found(moving, entry, column) for column in iou.moving[:_MOVING])]
     cells += [_ms(record.latency_ms), _ms(record.age_ms, f"{record.oldest_ms:.0f}"), _ms(record.lead_ms)]
     share = record.misses / max(1, record.evaluations)
     cells.append(Cell(f"{share:.1%}", share, f"of {record.evaluations:,}", f"{record.misses:,} without an answer"))
@@ -70,7 +73,8 @@ def wins_table(found: Sequence[Strategy]) -> Table | None:
     if plain is None:
         return None
     bodies = [tuple(_wins(each, plain)) for each in found if each is not plain and _same(each, plain)]
-    columns = tuple([(LABELS[column], "") for column in DIFFERENCE_COLUMNS] + [("Won", "ms")])
+    iou = shared_iou([plain.measured])
+    columns = tuple([(iou.labels[column], "") for column in iou.compared] + [("Won", "ms")])
     caption = _WINS.replace("{plain}", plain.name)
     lines = tuple(body for body in bodies if body)
     return Table("stream-wins", caption, f"Strategies less {plain.name}", columns, lines) if lines else None
@@ -85,7 +89,7 @@ def _wins(strategy: Strategy, plain: Strategy) -> Iterator[Line]:
     """Compare delay by delay: the first line is the strategy's, the others belong to it."""
     for place, (entry, other) in enumerate(pairs_with(strategy, plain)):
         cells = []
-        for column in DIFFERENCE_COLUMNS:
+        for column in shared_iou([entry]).compared:
             difference = entry.minus(other, column)
             title = f"{evidence(entry, column)}; difference: {interval_phrase(difference, with_sign=True)}"
             cells.append(difference_cell(difference, title=title))
@@ -111,14 +115,15 @@ def _whole(value_ms: float) -> str:
 
 def lead_table(found: Sequence[LeadSeries]) -> Table | None:
     """Show the best lead of each series by category; None where there is none."""
-    columns = tuple((LABELS[column], "ms") for column in DIFFERENCE_COLUMNS)
+    iou = shared_iou(entry for series in found for entry in series.entries)
+    columns = tuple((iou.labels[column], "ms") for column in iou.compared)
     lines = tuple((_best_leads(series),) for series in found)
     return Table("stream-leads", _LEADS, "Streams", columns, lines) if lines else None
 
 
 def _best_leads(series: LeadSeries) -> Line:
     cells = []
-    for column in DIFFERENCE_COLUMNS:
+    for column in shared_iou(series.entries).compared:
         entry, lead = series.best(column)
         note = f"{lead.low:.0f} to {lead.high:.0f}" if math.isfinite(lead.low) else ""
         cells.append(Cell(f"{lead.value:.0f}", finite(lead.value), note, evidence(entry, column)))

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from semgrid_eval.classes import KNOWN_IDS
 from semgrid_eval.report.estimates.bootstrap import Scores
 from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.rows.pairing import changed_settings, changed_targets, main_group, settings_of, shared_windows
@@ -84,5 +83,5 @@ def known_m2(row: Row) -> float:
     grid = row.results[0].grid
     if grid is None:
         return np.nan
-    cells = row.results[0].counts[:, list(KNOWN_IDS)].sum(axis=(1, 2)).mean()
+    cells = row.results[0].counts[:, list(row.classes.known)].sum(axis=(1, 2)).mean()
     return float(cells * grid.spec.cell_m**2)

@@ -3,15 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from semgrid_eval.report.estimates.bootstrap import LABELS, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, shared_iou
 from semgrid_eval.report.estimates.way import Order, Way, ways
 from semgrid_eval.report.rows.load import Row
-from semgrid_eval.report.rows.pairing import DIFFERENCE_COLUMNS, HEADLINE, verdict
+from semgrid_eval.report.rows.pairing import HEADLINE, verdict
 from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, plural
 from semgrid_eval.report.tables.table import Cell, Line, Table
 from semgrid_eval.report.tables.values import value_table
 
-_MOVING_COLUMNS = ("vehicles", "person", "bicycle")
 _MOST_PAIRS = 4
 _WAY = (
     "Share of the way from {lower} to {upper} that each row has covered, (row − lower) / (upper − lower), "
@@ -25,14 +24,15 @@ _EXPECTED = (
 
 def way_table(scores: Scores, moving: Scores, rows: Sequence[Row]) -> Table | None:
     """Show the share of the way of every row that has one: by category, and near moving actors; None where none has."""
-    columns = [(LABELS[column], "all cells") for column in DIFFERENCE_COLUMNS]
-    columns += [(LABELS[column], "near moving actors") for column in _MOVING_COLUMNS]
+    iou = shared_iou(scores.values())
+    columns = [(iou.labels[column], "all cells") for column in iou.compared]
+    columns += [(iou.labels[column], "near moving actors") for column in iou.moving]
     near = {entry.row.name: (entry, way) for entry, way in ways(moving, rows)}
     found, lines = list(ways(scores, rows)), []
     for entry, way in found:
-        cells = [_share(entry, way, column) for column in DIFFERENCE_COLUMNS]
+        cells = [_share(entry, way, column) for column in iou.compared]
         there = near.get(entry.row.name)
-        cells += [_share(*there, column) if there else Cell(ABSENT) for column in _MOVING_COLUMNS]
+        cells += [_share(*there, column) if there else Cell(ABSENT) for column in iou.moving]
         kind = "truth" if entry.row.uses_truth else ""
         lines.append((Line(entry.row.name, tuple(cells), kind, entry.row.record.label, entry.row.number),))
     lower = ", ".join(dict.fromkeys(way.lower.row.name for _, way in found))
@@ -43,7 +43,7 @@ def way_table(scores: Scores, moving: Scores, rows: Sequence[Row]) -> Table | No
 
 def expected_table(expected: Scores, order: Order) -> Table:
     """Show scores against what is measured on average, and each row's place there and before."""
-    table = value_table("expected", _EXPECTED, expected, DIFFERENCE_COLUMNS)
+    table = value_table("expected", _EXPECTED, expected, shared_iou(expected.values()).compared)
     places = _places(order)
     bodies = tuple(
         (replace(line, cells=(*line.cells, places.get(line.header, Cell(ABSENT)))),) for (line,) in table.bodies

@@ -3,6 +3,7 @@
   const PREFIX = "data:image/png;base64,";
   const PALETTE_AT = 41; // after the signature, IHDR and the head of PLTE
   const root = document.documentElement;
+  const WORDS = root.dataset.classes ? "Class colours of the set" : "Class colours of the paper";
 
   const remainders = Uint32Array.from({ length: 256 }, (_, n) => {
     for (let bit = 0; bit < 8; bit++) n = n & 1 ? 0xedb88320 ^ (n >>> 1) : n >>> 1;
@@ -33,7 +34,7 @@
 
   const legend = document.querySelector("#examples .legend");
   if (!legend) return;
-  const button = element("button", { type: "button", className: "colours" }, "Class colours of the paper");
+  const button = element("button", { type: "button", className: "colours" }, WORDS);
   button.title = "The colours shown first can be told apart by colour-blind readers, too";
   button.setAttribute("aria-pressed", "false");
   button.onclick = () => {

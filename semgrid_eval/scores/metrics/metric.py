@@ -1,12 +1,13 @@
 """What a metric is, and what it sees: scored windows whose cells are divided into regions by partitions."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.grids.spec import GridSpec
 
 Counts = NDArray[np.int64]
@@ -29,6 +30,7 @@ class ScoredWindows:
     inputs: Grid | None
     actors: Grid | None  # (N, H, W) flags of true actors, `STANDING` and `MOVING`; None where no log holds the truth
     spec: GridSpec  # extent of the grids
+    classes: ClassSet = DEFAULT_CLASSES  # of their cells
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,15 @@ def mean_finite(values: Floats, *, axis: int = -1) -> Floats:
     return divided(np.nansum(values, axis=axis), np.isfinite(values).sum(axis=axis))
 
 
+Shown = Callable[[Metric], Sequence[str]]
+"""Chooses the columns of a metric that a report shows."""
+
+
+def only(name: str) -> Shown:
+    """Show of one metric its own choice, and of others nothing."""
+    return lambda metric: metric.shown if metric.name == name else ()
+
+
 CellNumbers = Callable[[ScoredWindows], NDArray[np.int64] | None]
 
 
@@ -117,12 +128,12 @@ class Partition:
     """Cells of windows divided into regions.
 
     `number` numbers the region of each cell (N, H, W), -1 where it is in none; it returns None where windows do not
-    tell. `shown` is what a report shows: columns by metric; of a metric that is not named, nothing.
+    tell. `shown` chooses the columns of a metric that a report shows, by default the metric's own choice.
     """
 
     name: str  # in files and columns
     regions: Sequence[str]  # their names, as a reader sees them
     words: str  # which cells the regions hold, to follow "IoU"; empty where it is all of them
     number: CellNumbers
-    shown: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    shown: Shown = lambda metric: metric.shown
     by_inputs: bool = False  # whether regions depend on a row's inputs, so that rows of other inputs have other cells

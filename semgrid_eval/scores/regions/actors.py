@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.grids.spec import MOVING, STANDING
+from semgrid_eval.scores.metrics.iou import Iou
 from semgrid_eval.scores.metrics.metric import Partition, ScoredWindows
 
 
@@ -19,5 +20,5 @@ ACTORS = Partition(
     ("moving", "standing"),
     "of the cells near moving and near standing actors",
     _number,
-    {"iou": ("vehicles", "person", "bicycle")},
+    lambda metric: metric.moving if isinstance(metric, Iou) else (),
 )

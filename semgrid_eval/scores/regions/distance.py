@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.grids.spec import GridSpec
-from semgrid_eval.scores.metrics.metric import Partition, ScoredWindows
+from semgrid_eval.scores.metrics.metric import Partition, ScoredWindows, only
 
 EDGES_M = (20.0, 40.0, 60.0)
 
@@ -24,5 +24,5 @@ DISTANCE = Partition(
     ("0 to 20 m", "20 to 40 m", "40 to 60 m", "beyond 60 m"),
     "by distance from the vehicle",
     _number,
-    {"iou": ("mean_known",)},
+    only("iou"),
 )

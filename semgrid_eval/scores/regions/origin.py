@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import UNKNOWN
-from semgrid_eval.scores.metrics.metric import Partition, ScoredWindows
+from semgrid_eval.scores.metrics.metric import Partition, ScoredWindows, only
 
 
 def _number(scored: ScoredWindows) -> NDArray[np.int64] | None:
@@ -19,6 +19,6 @@ ORIGIN = Partition(
     ("in the newest input", "in an older input only", "in no input"),
     "by where the inputs had seen something",
     _number,
-    {"accuracy": ("right",)},
+    only("accuracy"),
     by_inputs=True,
 )

@@ -8,10 +8,8 @@ import torch
 from numpy.typing import NDArray
 from pydantic import Field
 
-from semgrid_eval.classes import KNOWN_IDS, UNKNOWN
+from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.windows.disturb.disturbance import Disturbance, Inputs
-
-_FIRST, _KNOWN = KNOWN_IDS[0], len(KNOWN_IDS)  # their ids follow each other
 
 
 class Mislabelled(Disturbance):
@@ -34,23 +32,29 @@ class Mislabelled(Disturbance):
         """Change classes within patches."""
         side = max(1, round(self.patch_m / inputs.spec.cell_m))
         windows, count = inputs.frames.shape
-        shape = (inputs.spec.rows, inputs.spec.columns)
+        shape, known = (inputs.spec.rows, inputs.spec.columns), len(inputs.data.classes.known)
         steps = np.zeros((windows, count, *shape), np.uint8)
         for of_window, generator in zip(steps, inputs.generators(self.seed), strict=True):
             for of_input in of_window:
-                of_input[:] = patches(generator, self.strength, side, shape)
-        return replace(inputs, grids=_moved_on(inputs.grids, torch.from_numpy(steps).to(inputs.grids.device)[:, None]))
+                of_input[:] = patches(generator, self.strength, side, shape, known)
+        moves = torch.from_numpy(steps).to(inputs.grids.device)[:, None]
+        return replace(inputs, grids=_moved_on(inputs.grids, moves, known))
 
 
-def patches(generator: np.random.Generator, share: float, side: int, shape: tuple[int, int]) -> NDArray[np.uint8]:
-    """Draw patches on a lattice at a random place: (H, W), by how many classes a cell is moved on, 0 outside."""
+def patches(
+    generator: np.random.Generator, share: float, side: int, shape: tuple[int, int], known: int
+) -> NDArray[np.uint8]:
+    """Draw patches on a lattice at a random place: (H, W), by how many classes a cell is moved on, 0 outside.
+
+    Of one known class alone there is no other to move on to.
+    """
     blocks = [-(-length // side) + 1 for length in shape]
-    steps = np.where(generator.random(blocks) < share, generator.integers(1, _KNOWN, blocks), 0).astype(np.uint8)
+    steps = np.where(generator.random(blocks) < share, generator.integers(1, max(2, known), blocks), 0).astype(np.uint8)
     top, left = generator.integers(side, size=2).tolist()
     return steps.repeat(side, axis=0).repeat(side, axis=1)[top : top + shape[0], left : left + shape[1]]
 
 
-def _moved_on(grids: torch.Tensor, steps: torch.Tensor) -> torch.Tensor:
+def _moved_on(grids: torch.Tensor, steps: torch.Tensor, known: int) -> torch.Tensor:
     """Take for each known class the one that many ids on, after the last one the first again."""
-    moved = (grids.to(torch.int16) - _FIRST + steps) % _KNOWN + _FIRST
+    moved = (grids.to(torch.int16) - 1 + steps) % known + 1  # 0 is unknown
     return torch.where(grids == UNKNOWN, grids, moved.to(torch.uint8))

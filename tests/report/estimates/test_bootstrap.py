@@ -7,7 +7,6 @@ from support.scoring import score_rows
 
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.estimates.bootstrap import (
-    LABELS,
     LEVEL,
     Estimate,
     Resampling,
@@ -111,7 +110,7 @@ def test_windows_without_such_actors_are_no_evidence():
     assert entry.windows == 2
     assert entry.mean["car"] == pytest.approx(0.5)
     twin = Resampling(0).draw(["town_0", "town_1"], [1])  # the others are not drawn
-    np.testing.assert_allclose(entry.draws[:, list(LABELS).index("car")], twin.weights @ [0.05, 0.45])
+    np.testing.assert_allclose(entry.draws[:, list(IOU.labels).index("car")], twin.weights @ [0.05, 0.45])
 
 
 def test_without_truth_there_is_no_region():
@@ -138,7 +137,7 @@ def test_value_is_the_mean_over_seeds_of_pooled_scores(run):
     got = score_rows([row], np.random.default_rng(0), draws=10)[row.name]
     cars = [class_iou(result.counts.sum(axis=0))[CLASS_NAMES.index("car")] for result in row.results]
     assert got.mean["car"] == pytest.approx(np.mean(cars))
-    assert got.by_seed[:, list(LABELS).index("car")] == pytest.approx(cars)
+    assert got.by_seed[:, list(IOU.labels).index("car")] == pytest.approx(cars)
 
 
 def test_a_row_does_not_differ_from_itself(run):
@@ -189,8 +188,8 @@ def test_one_recording_gives_no_interval(tmp_path):
 
 def test_an_interval_is_the_middle_of_the_draws_longer_by_what_few_recordings_ask(run):
     row = load_runs([run])[0].rows[0]
-    draws, size = np.full((1001, len(LABELS)), np.nan), len(LABELS)
-    draws[:, list(LABELS).index("road")] = np.linspace(0.4, 0.6, 1001)
+    draws, size = np.full((1001, len(IOU.labels)), np.nan), len(IOU.labels)
+    draws[:, list(IOU.labels).index("road")] = np.linspace(0.4, 0.6, 1001)
     sums, units = np.zeros((1, 10, 10), np.int64), np.full(size, 5)
     entry = RowScores(row, IOU, row.results, np.full((1, size), 0.5), draws, sums, 1, units)
     half = 0.095 * stretch(5, LEVEL)

@@ -9,6 +9,7 @@ from semgrid_eval.report.estimates.bootstrap import SEED, Estimate, Resampling, 
 from semgrid_eval.report.estimates.division import EVERYWHERE
 from semgrid_eval.report.estimates.gate import Gate, Limit, Verdict, check_gate, hold, parse_limit
 from semgrid_eval.report.rows.load import load_runs
+from semgrid_eval.scores.metrics.table import IOU
 
 GOOD, BAD = FakeRow("DC", "ED", 0.06, 1), FakeRow("DC", "ED", 0.3, 1)
 BASE = FakeRow("DC", "BL")
@@ -156,7 +157,7 @@ def test_a_loss_in_one_recording_alone_is_not_clear():
     ],
 )
 def test_limits_are_a_column_and_what_it_may_lose(text, limit):
-    assert parse_limit(text) == limit
+    assert parse_limit(text, IOU.labels) == limit
 
 
 @pytest.mark.parametrize(
@@ -172,4 +173,4 @@ def test_limits_are_a_column_and_what_it_may_lose(text, limit):
 )
 def test_a_limit_that_cannot_be_is_one_line(text, fault):
     with pytest.raises(InputError, match=f"^fail-below: {fault}"):
-        parse_limit(text)
+        parse_limit(text, IOU.labels)

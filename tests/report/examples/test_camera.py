@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from semgrid_eval.classes import CLASS_NAMES, class_palette
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, DEFAULT_CLASSES
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.report.examples.drawing import POINTLESS, POINTLESS_COLOUR
+from semgrid_eval.report.examples.drawing import POINTLESS_COLOUR
 from semgrid_eval.report.examples.thumbnails import RunThumbnails, View
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.thumbnails import FramePictures
@@ -43,14 +43,14 @@ def test_camera_and_segmentation_of_a_time_are_shown_in_the_colours_of_grids(vie
     kind, classes = decoded(labels.uri)
     assert (kind, classes.shape) == ("image/png", (128, 256, 3))
     assert tuple(classes[0, 128]) == POINTLESS_COLOUR, "above the street is sky"
-    assert tuple(classes[-1, 128]) == tuple(class_palette(safe=True)[CLASS_NAMES.index("road")])
-    assert {POINTLESS, CLASS_NAMES.index("road"), CLASS_NAMES.index("building")} <= labels.colours
+    assert tuple(classes[-1, 128]) == tuple(DEFAULT_CLASSES.palette(safe=True)[CLASS_NAMES.index("road")])
+    assert {CLASS_COUNT + 1, CLASS_NAMES.index("road"), CLASS_NAMES.index("building")} <= labels.colours
 
 
 def test_labels_follow_the_class_map_of_the_run(view):
     mapped = dataclasses.replace(view, grid=GridConfig(class_map={"road": "car"}))
     _, labels = mapped.photos(view.window.target_stamp_ns, "now")
-    assert tuple(decoded(labels.uri)[1][-1, 128]) == tuple(class_palette(safe=True)[CLASS_NAMES.index("car")])
+    assert tuple(decoded(labels.uri)[1][-1, 128]) == tuple(DEFAULT_CLASSES.palette(safe=True)[CLASS_NAMES.index("car")])
 
 
 def test_pictures_that_are_missing_or_damaged_are_left_out(view):

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from semgrid_eval.classes import CLASS_NAMES, MASK_COLOUR, class_palette
-from semgrid_eval.report.examples.drawing import CLASS_LEGEND, class_style
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES, MASK_COLOUR
+from semgrid_eval.report.examples.drawing import class_legend, class_style
 
 # Machado, Oliveira and Fernandes 2009: linear sRGB as seen without one kind of cone.
 VISIONS = {
@@ -27,15 +27,15 @@ def _least_distance(palette, vision):
 
 @pytest.mark.parametrize("vision", VISIONS)
 def test_no_two_safe_colours_look_alike_to_any_reader(vision):
-    assert _least_distance(class_palette(safe=True), vision) > 13
+    assert _least_distance(DEFAULT_CLASSES.palette(safe=True), vision) > 13
 
 
 def test_the_papers_colours_do_to_some():
-    assert _least_distance(class_palette(), "deutan") < 3
+    assert _least_distance(DEFAULT_CLASSES.palette(), "deutan") < 3
 
 
 def test_the_style_holds_both_palettes():
-    safe, paper = class_style().split(":root[data-colours=paper]")
+    safe, paper = class_style(DEFAULT_CLASSES).split(":root[data-colours=paper]")
     assert "--class-1:#1c3353" in safe
     assert "--class-1:#804080" in paper
-    assert [name for name, _ in CLASS_LEGEND] == [name.replace("_", " ") for name in CLASS_NAMES]
+    assert [name for name, _ in class_legend(DEFAULT_CLASSES)] == [name.replace("_", " ") for name in CLASS_NAMES]

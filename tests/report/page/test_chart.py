@@ -5,7 +5,7 @@ import pytest
 from support.fake_run import counted_row
 from support.scoring import score_rows
 
-from semgrid_eval.report.claims.claims import paper_value
+from semgrid_eval.report.claims.claims import paper_table
 from semgrid_eval.report.page.chart import draw_chart
 from semgrid_eval.report.page.chooser import chooser_axes
 from semgrid_eval.report.rows.load import Run
@@ -48,7 +48,7 @@ def test_marks_stand_where_values_lie_between_the_ends_of_an_axis(chart):
         assert mark.at == pytest.approx(100 * (float(mark.text) - low) / (high - low), abs=0.1)
         assert 0 <= mark.low <= mark.at <= mark.high <= 100
     paper = chart.groups[0][1][1].marks[3].paper
-    assert paper == pytest.approx(100 * (paper_value("ED-DC", "vehicles") - low) / (high - low), abs=0.1)
+    assert paper == pytest.approx(100 * (paper_table()["ED-DC"]["vehicles"] - low) / (high - low), abs=0.1)
 
 
 def test_the_best_of_those_that_compete_is_marked_and_who_is_told_is_not(chart):

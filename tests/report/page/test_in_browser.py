@@ -9,7 +9,7 @@ import time
 import pytest
 from support.browser import open_page
 
-from semgrid_eval.classes import MASK_COLOUR, class_palette
+from semgrid_eval.classes import DEFAULT_CLASSES, MASK_COLOUR
 
 
 @pytest.fixture
@@ -190,7 +190,7 @@ def test_a_key_switches_pictures_and_legend_to_the_papers_colours_and_back(opene
     paper = colours()
     assert press() == "false"
     assert colours() == safe
-    for (found, road, _), palette in ((safe, class_palette(safe=True)), (paper, class_palette())):
+    for (found, road, _), palette in ((safe, DEFAULT_CLASSES.palette(safe=True)), (paper, DEFAULT_CLASSES.palette())):
         allowed = {tuple(colour) for colour in palette.tolist()} | {MASK_COLOUR}
         assert len(found) > 2
         assert found <= allowed

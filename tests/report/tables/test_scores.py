@@ -6,7 +6,7 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.report.claims.claims import paper_table
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables import scores as tables
-from semgrid_eval.scores.metrics.iou import CATEGORY_COLUMNS
+from semgrid_eval.scores.metrics.table import IOU
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def test_a_row_that_the_paper_lacks_or_that_is_not_of_its_data_stands_alone(scor
 
 def test_the_best_of_each_column_is_marked(scores):
     table = shown(scores)["categories"]
-    for at in range(len(CATEGORY_COLUMNS)):
+    for at in range(len(IOU.category_columns)):
         values = {body[0].cells[at].sort: body[0].cells[at].tone for body in table.bodies}
         assert [value for value, tone in values.items() if tone == "best"] == [max(values)]
 

@@ -5,9 +5,9 @@ from support.scoring import score_rows
 
 from semgrid_eval.files import read_json
 from semgrid_eval.report.claims.claims import paper_table
-from semgrid_eval.report.estimates.bootstrap import LABELS
 from semgrid_eval.report.page.write import write_report
 from semgrid_eval.report.rows.load import load_runs
+from semgrid_eval.scores.metrics.table import IOU
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,7 @@ def scores(run):
 
 def test_the_summary_has_every_row_and_score(page, scores):
     table = pd.read_csv(page.parent / "summary.csv")
-    assert len(table[(table.metric == "iou") & (table.division == "all")]) == len(scores) * len(LABELS)
+    assert len(table[(table.metric == "iou") & (table.division == "all")]) == len(scores) * len(IOU.labels)
     known = table[np.isfinite(table.low)]
     assert (known.low <= known.high).all()
 
@@ -35,7 +35,7 @@ def test_every_table_of_the_page_is_there_in_every_format(page):
 def test_the_record_for_machines_has_scores_differences_and_failures(page):
     record = read_json(page.parent / "report.json")
     assert record["rows"]["ED-DC"]["reference"] == "BL-DC"
-    assert set(record["rows"]["ED-DC"]["differences"]) == set(LABELS)
+    assert set(record["rows"]["ED-DC"]["differences"]) == set(IOU.labels)
     assert [failure["name"] for failure in record["failures"]] == ["ED-NT", "logs/town_broken.mcap"]
     assert record["runs"][0]["record"]["logs"][0]["digest"]
 

@@ -3,6 +3,7 @@
 from support.bad import (
     bags,
     cityscapes,
+    class_sets,
     commands,
     containers,
     contracts,
@@ -20,7 +21,7 @@ from support.bad import (
 )
 
 KINDS = (
-    *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, matrices.STREAM, on_logs.KIND),
+    *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, matrices.STREAM, class_sets.KIND, on_logs.KIND),
     *latencies.KINDS,
     *(own_models.MODEL, predictions.KIND, contracts.CONTRACT),
     *(*cityscapes.KINDS, *bags.KINDS, *drives.KINDS),

@@ -10,14 +10,15 @@ from support.bad import small
 from support.bad.case import Bad, Kind
 from support.toy_world import FRAME_NS, START_NS
 
-from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES
+from semgrid_eval.grids.extent import place_of
 from semgrid_eval.grids.spec import GridSpec
 from semgrid_eval.log.codec import PREDICTIONS_RECORD
+from semgrid_eval.log.grids import class_layer
 from semgrid_eval.log.predictions import TOPIC, Prediction, prediction_message
 from semgrid_eval.log.writer import MessageWriter
-from semgrid_eval.runs.recorded import extent_of
 
-PLACE = extent_of(GridSpec()).place
+PLACE, LAYER = place_of(GridSpec()), class_layer(DEFAULT_CLASSES)
 LOG = Path("answers/toy1.mcap")
 ANSWERS = "model: log, settings: {folder: answers}"
 
@@ -52,7 +53,7 @@ def _write(
         if record is not None:
             writer.metadata(PREDICTIONS_RECORD, record)
         for place, each in enumerate(answers):
-            message = prediction_message(each, PLACE)
+            message = prediction_message(each, LAYER, PLACE)
             change(message)
             writer.write(topic, message, log_ns=START_NS + place, publish_ns=each.publish_ns)
 
@@ -81,7 +82,7 @@ def _other(words: str, spoil: Callable[[], object], row: str = ANSWERS) -> Bad:
 def _two_topics() -> None:
     with LOG.open("wb") as stream, MessageWriter(stream) as writer:
         for topic in ("/a", "/b"):
-            writer.write(topic, prediction_message(answer(8, 5), PLACE), log_ns=START_NS)
+            writer.write(topic, prediction_message(answer(8, 5), LAYER, PLACE), log_ns=START_NS)
 
 
 LATE = Timestamp(seconds=2_000_000_000)

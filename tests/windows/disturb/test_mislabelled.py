@@ -1,6 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.disturbed import SPEC, batch_of, numbered, windows_of
+from support.own_classes import class_set
 from support.recordings import random_recording
 
 from semgrid_eval.grids.spec import GridSpec
@@ -28,8 +31,22 @@ def test_a_share_of_the_cells_is_changed(share):
     assert (found != plain)[plain > 0].mean() == pytest.approx(share, rel=0.1)
 
 
+@pytest.mark.parametrize("known", [1, 2])
+def test_known_cells_stay_known_whatever_the_number_of_classes(known):
+    recording = random_recording(4, size=64)
+    recording.grids[:] %= known + 1
+    windows = windows_of([recording], [(0, (0, 5), 10)], spec=BIG, translate=False)
+    labels = ({"name": f"c{i}", "category": "all", "labels": [i]} for i in range(1, known + 1))
+    windows = replace(windows, data=replace(windows.data, classes=class_set(*labels, categories=[{"name": "all"}])))
+    plain = batch_of(windows, spec=BIG).past.numpy()
+    found = batch_of(windows, spec=BIG, kind="mislabelled", strength=1.0, patch_m=4.0).past.numpy()
+    np.testing.assert_array_equal(found == 0, plain == 0)
+    assert found.max() == known
+    assert (found[plain > 0] != plain[plain > 0]).all() == (known > 1), "one class has no other to move on to"
+
+
 def test_patches_are_squares_of_one_change_on_a_lattice():
-    steps = patches(np.random.default_rng(3), 0.5, 3, (13, 10))
+    steps = patches(np.random.default_rng(3), 0.5, 3, (13, 10), 9)
     assert steps.shape == (13, 10)
     edges = [np.flatnonzero(np.diff(steps.astype(int), axis=axis).any(axis=1 - axis)) + 1 for axis in (0, 1)]
     for found in edges:
