@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from support.own_classes import FILE
 
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
@@ -373,4 +374,28 @@ def test_a_batch_beyond_all_memory_is_one_line(tmp_path):
 def test_a_matrix_that_is_no_file_is_not_waited_for(tmp_path, make):
     make(tmp_path / "m.yaml")
     with pytest.raises(ConfigError, match=r"m\.yaml: is "):
+        load_matrix(str(tmp_path / "m.yaml"))
+
+
+def test_a_class_set_is_found_beside_the_file_that_names_it(tmp_path):
+    (tmp_path / "base").mkdir()
+    (tmp_path / "base" / "mine.yaml").write_text(FILE)
+    (tmp_path / "base" / "b.yaml").write_text(
+        "defaults: {grid: {classes: mine.yaml}}\nrows: [{name: a, model: newest}]\n"
+    )
+    (tmp_path / "m.yaml").write_text(
+        "extends: base/b.yaml\nrows: [{name: b, model: fuse, grid: {stretch_frames: 40}}]\n"
+    )
+    rows = load_matrix(str(tmp_path / "m.yaml")).rows
+    assert [row.grid.classes.names[1] for row in rows] == ["drivable", "drivable"]
+    assert rows[0].given.classes == rows[1].grid.classes
+    assert rows[0].identity()["grid"]["classes"] == rows[0].grid.classes.model_dump(mode="json")
+
+
+def test_rows_of_a_matrix_have_one_class_set(tmp_path):
+    (tmp_path / "mine.yaml").write_text(FILE)
+    (tmp_path / "m.yaml").write_text(
+        "rows: [{name: a, model: newest}, {name: b, model: fuse, grid: {classes: mine.yaml}}]\n"
+    )
+    with pytest.raises(ConfigError, match=r"m\.yaml: grid\.classes: rows 'a' and 'b' have different ones"):
         load_matrix(str(tmp_path / "m.yaml"))
