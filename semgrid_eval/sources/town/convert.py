@@ -54,7 +54,9 @@ def config_of(benchmark: Benchmark, size: SizeName) -> SyntheticConfig:
     """Return what `plan_recordings` needs for one size of a benchmark."""
     chosen = benchmark.sizes[size]
     recordings = chosen.train.recordings + chosen.val.recordings
-    same = {name: getattr(benchmark, name) for name in ("width", "height", "stereo", "town_size_m", "duration_s")}
+    same = {
+        name: getattr(benchmark, name) for name in ("width", "height", "stereo", "rig", "town_size_m", "duration_s")
+    }
     return SyntheticConfig(
         recordings=recordings,
         seed=chosen.seed,

@@ -25,8 +25,8 @@ from semgrid_eval.sources.town.picture_errors import (
 )
 from semgrid_eval.sources.town.redrawing import TownErrors
 from semgrid_eval.sources.town.rendering import render_recording
-from semgrid_eval.sources.town.rig import Rig
 from semgrid_eval.sources.town.sensors import Camera, View
+from semgrid_eval.sources.town.stereo_camera import StereoCamera
 from semgrid_eval.sources.town.varied import fixed_conditions
 
 SEED = (5, 0, 2, 1)
@@ -53,9 +53,9 @@ def view(frame: int) -> View:
 def test_a_branch_that_goes_on_by_the_same_random_numbers_is_the_recording_byte_for_byte():
     camera = Camera(calibration(), WIDTH, HEIGHT)
     conditions = replace(fixed_conditions(WIDTH, HEIGHT), calibration=calibration())
-    rig = Rig(conditions, "modelled", recording_streams(SEED)[-1])
+    stereo = StereoCamera(conditions, "modelled", recording_streams(SEED)[-1])
     image = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    own = [rig.frame(frame, [(view(frame), image)]) for frame in range(7)]
+    own = [stereo.frame(frame, [(view(frame), image)]) for frame in range(7)]
 
     numbers = recording_streams(SEED)[-1].spawn(2)
     errors = PictureErrors.begin("modelled", Strengths(), *numbers)
