@@ -15,7 +15,7 @@ import semgrid_eval
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.files import digest_value, read_json
 
-BENCHMARKS = ("town-v1",)
+BENCHMARKS = ("town-v1", "town-rig-v1")
 FINGERPRINT_CHARACTERS = 8
 """Of each recording's fingerprint that are published; enough to tell which recordings differ."""
 

@@ -81,3 +81,7 @@ class SizeOptions(Config):
     """Which size of a benchmark."""
 
     size: Annotated[SizeName, Field(description="Full is as large as the paper's data.")] = "small"
+
+
+class NoOptions(Config):
+    """Nothing can be chosen."""
