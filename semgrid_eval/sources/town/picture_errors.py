@@ -34,6 +34,11 @@ def sensor_streams(seed: tuple[int, ...], sensor: str) -> list[Generator]:
     return of_sensors[_OTHERS.index(sensor)].spawn(2)
 
 
+def error_stream(seed: tuple[int, ...], sensor: str) -> Generator:
+    """Return the random numbers for the errors of any sensor."""
+    return recording_streams(seed)[-1] if sensor == FRONT else sensor_streams(seed, sensor)[1]
+
+
 @dataclass(frozen=True)
 class Strengths:
     """How strong each kind of error is."""

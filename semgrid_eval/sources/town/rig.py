@@ -11,9 +11,8 @@ from semgrid_eval.geometry import Floats
 from semgrid_eval.recording.lidar import Mount
 from semgrid_eval.recording.types import CameraCalibration, Moment, Pose
 from semgrid_eval.sources.benchmarks import RigName, Stereo
-from semgrid_eval.sources.town.drives import FRAME_RATE_HZ
 from semgrid_eval.sources.town.lidar import Lidar, LidarErrors, LidarNoise
-from semgrid_eval.sources.town.picture_errors import FRONT, LIDAR, recording_streams, sensor_streams
+from semgrid_eval.sources.town.picture_errors import FRONT, LIDAR, error_stream, recording_streams, sensor_streams
 from semgrid_eval.sources.town.shading import Painter, draw_sunlight
 from semgrid_eval.sources.town.stage import Stage, in_sight
 from semgrid_eval.sources.town.stereo_camera import StereoCamera
@@ -77,12 +76,11 @@ RIGS: Mapping[RigName, tuple[str, ...]] = {
     "surround+lidar": (FRONT, *SIDES, LIDAR),
 }
 """The sensors of each rig; one that several have is the same in all, byte for byte."""
-_QUARTER_S = 0.25 / FRAME_RATE_HZ
 CLOCKS = {
-    "left": Clock(FRAME_RATE_HZ, _QUARTER_S),
-    "rear": Clock(FRAME_RATE_HZ, 2.0 * _QUARTER_S),
-    "right": Clock(FRAME_RATE_HZ, 3.0 * _QUARTER_S),
-    LIDAR: Clock(10.0, 0.03),
+    "left": Clock(10.0, 0.010),
+    "rear": Clock(10.0, 0.043),
+    "right": Clock(10.0, 0.077),
+    LIDAR: Clock(10.0, 0.030),
 }
 """Of all but the front camera; those around the vehicle look one after the other, as it is done to spread the load."""
 
@@ -146,15 +144,14 @@ def sensors_of(
     rig: RigName, front: Conditions, stereo: Stereo, seed: tuple[int, ...], stage: Stage
 ) -> dict[str, Sensor]:
     """Return the sensors of a recording by name."""
-    _, _, light, errors = recording_streams(seed)
-    sunlight = draw_sunlight(light)
+    sunlight = draw_sunlight(recording_streams(seed)[2])
     found: dict[str, Sensor] = {}
     for name in RIGS[rig]:
-        own_errors = errors if name == FRONT else sensor_streams(seed, name)[1]
+        errors = error_stream(seed, name)
         if name == LIDAR:
-            found[name] = _lidar(stereo, own_errors)
+            found[name] = _lidar(stereo, errors)
             continue
-        camera = StereoCamera(conditions_of(name, front), stereo, own_errors)
+        camera = StereoCamera(conditions_of(name, front), stereo, errors)
         painters = [Painter(each, sunlight, stage.still) for each in camera.cameras]
         widening = max(_WIDENING, front.side_slope + _WIDENING_BEYOND) if name == FRONT else None
         found[name] = CameraSensor(name, camera, painters, widening)
