@@ -23,7 +23,8 @@ class LostSensor(Disturbance):
     def words(self) -> str:
         """Say what is wrong."""
         share = "" if self.strength == 1 else f" in {100 * self.strength:g}% of the windows"
-        return f"{' and '.join(self.sensors)} lost{share}"
+        *others, last = self.sensors
+        return f"{', '.join(others)}{' and ' * bool(others)}{last} lost{share}"
 
     def check(self, inputs: int, sensors: tuple[str, ...]) -> None:
         """Refuse to lose what the row does not have."""

@@ -1,6 +1,6 @@
 import pytest
 import torch
-from support.disturbed import batch_of, numbered, windows_of
+from support.disturbed import batch_of, numbered, settings, windows_of
 
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.runs.matrix import load_matrix
@@ -28,6 +28,18 @@ def test_a_share_of_the_windows_loses_them_and_it_is_the_same_share_again():
     lost = [(batch_of(windows(60), **disturb).past[:, 2] == 0).all(dim=(1, 2, 3)) for _ in range(2)]
     assert 0.15 < lost[0].float().mean() < 0.45
     assert torch.equal(*lost)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"sensors": ["lidar"]}, "lidar lost"),
+        ({"sensors": ["left", "rear", "lidar"]}, "left, rear and lidar lost"),
+        ({"sensors": ["lidar"], "strength": 0.25}, "lidar lost in 25% of the windows"),
+    ],
+)
+def test_the_words_name_what_is_lost(changes, words):
+    assert settings(kind="lost_sensor", **changes).words == words
 
 
 def test_a_sensor_that_the_row_does_not_have_cannot_be_lost(tmp_path):
