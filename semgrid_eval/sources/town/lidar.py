@@ -85,7 +85,7 @@ class LidarErrors:
     def sweep(self, stamp_ns: int, view: View, soup: Soup) -> LidarSweep:
         """Measure what is seen, of triangles those of the soup."""
         reflectance = reflectances(view, soup)
-        label_id, range_m, reach_m = view.label, view.depth_m, np.float32(RANGE_M[1])
+        label_id, range_m, reach_m = view.label, view.depth_m, np.full_like(view.depth_m, RANGE_M[1])
         lost = np.zeros(len(range_m), np.bool_)
         if self._noise is not None and self._labels is not None:
             label_id = self._labelled(view.label, self._labels)
