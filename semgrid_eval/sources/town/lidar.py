@@ -85,10 +85,9 @@ class LidarErrors:
     def sweep(self, stamp_ns: int, view: View, soup: Soup) -> LidarSweep:
         """Measure what is seen, of triangles those of the soup."""
         reflectance = reflectances(view, soup)
-        label_id, range_m, reach_m = view.label, view.depth_m, np.full_like(view.depth_m, RANGE_M[1])
+        label_id, range_m, reach_m = self.labelled(view.label), view.depth_m, np.full_like(view.depth_m, RANGE_M[1])
         lost = np.zeros(len(range_m), np.bool_)
-        if self._noise is not None and self._labels is not None:
-            label_id = self._labelled(view.label, self._labels)
+        if self._noise is not None:
             lost = self._is_lost(view, soup, self._noise)
             reach_m = self._reach_m(reflectance, self._noise.reach)
             range_m = range_m + np.float32(self._noise.range_m) * self._drawn(len(range_m))
@@ -103,9 +102,11 @@ class LidarErrors:
             label_id=label_id[seen],
         )
 
-    def _labelled(self, exact: NDArray[np.uint8], errors: LabelErrors) -> NDArray[np.uint8]:
-        """Return the labels (N,) with a network's errors; no point is taken for sky."""
-        found = errors.add(exact.reshape(-1, self._lidar.columns)).ravel()
+    def labelled(self, exact: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the labels (N,) that a network gives to the next sweep; no point is taken for sky."""
+        if self._labels is None:
+            return exact
+        found = self._labels.add(exact.reshape(-1, self._lidar.columns)).ravel()
         return np.where(found == _SKY, exact, found)
 
     def _is_lost(self, view: View, soup: Soup, noise: LidarNoise) -> NDArray[np.bool_]:

@@ -21,7 +21,7 @@ from semgrid_eval.sources.town.varied import Conditions
 
 STAMP_JITTER_S = 0.001
 _WIDENING, _WIDENING_BEYOND = 0.55, 0.065  # aside for each metre ahead: at least, and beyond what a camera sees
-_ROOF = Mount((0.95, 0.0, 1.73), (0.0, 0.0, 0.0, 1.0))
+ROOF = Mount((0.95, 0.0, 1.73), (0.0, 0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def sensors_of(
 
 
 def _lidar(stereo: Stereo, errors: np.random.Generator) -> LidarSensor:
-    lidar = Lidar(_ROOF)
+    lidar = Lidar(ROOF)
     return LidarSensor(lidar, LidarErrors(lidar, None if stereo == "exact" else LidarNoise(), errors))
 
 
