@@ -18,7 +18,7 @@ after a stop.
 """
 _TOWN_RIG_V1_HELP = """Make the frozen data set town-rig-v1 of the simulated town: four cameras and a LiDAR.
 
-It has 60 recordings for training and 40 for validation, some 3.5 GB, from the towns of town-v1. The last line says
+It has 60 recordings for training and 40 for validation, some 3 GB, from the towns of town-v1. The last line says
 whether every recording is the published one. Logs that are up to date are left as they are, so that the same command
 continues after a stop.
 """
