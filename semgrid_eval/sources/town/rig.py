@@ -93,7 +93,7 @@ class Sensor(Protocol):
 
 
 @dataclass(frozen=True)
-class CameraSensor:
+class RigCamera:
     """A stereo camera and what paints its pictures."""
 
     name: str
@@ -115,7 +115,7 @@ class CameraSensor:
 
 
 @dataclass(frozen=True)
-class LidarSensor:
+class RigLidar:
     """A LiDAR and its errors; all of a sweep is seen at one time."""
 
     lidar: Lidar
@@ -154,13 +154,13 @@ def sensors_of(
         camera = StereoCamera(conditions_of(name, front), stereo, errors)
         painters = [Painter(each, sunlight, stage.still) for each in camera.cameras]
         widening = max(_WIDENING, front.side_slope + _WIDENING_BEYOND) if name == FRONT else None
-        found[name] = CameraSensor(name, camera, painters, widening)
+        found[name] = RigCamera(name, camera, painters, widening)
     return found
 
 
-def _lidar(stereo: Stereo, errors: np.random.Generator) -> LidarSensor:
+def _lidar(stereo: Stereo, errors: np.random.Generator) -> RigLidar:
     lidar = Lidar(ROOF)
-    return LidarSensor(lidar, LidarErrors(lidar, None if stereo == "exact" else LidarNoise(), errors))
+    return RigLidar(lidar, LidarErrors(lidar, None if stereo == "exact" else LidarNoise(), errors))
 
 
 def looks_of(rig: RigName, seed: tuple[int, ...], front_s: Floats) -> list[tuple[float, str]]:
