@@ -1,4 +1,4 @@
-"""Make some recordings of town-v1 again and compare their fingerprints with the published ones.
+"""Make some recordings of a benchmark again and compare their fingerprints with the published ones.
 
 Example: python tools/check_benchmark.py --cache towns --recordings 30
 """
@@ -16,15 +16,22 @@ from semgrid_eval.executors import available_cores, local_executor
 from semgrid_eval.log.fingerprint import fingerprint
 from semgrid_eval.log.store import write_log
 from semgrid_eval.progress import silent
-from semgrid_eval.sources.benchmarks import SIZES, SizeName, load_benchmark, short_fingerprints
+from semgrid_eval.sources.benchmarks import (
+    BENCHMARKS,
+    SIZES,
+    Benchmark,
+    SizeName,
+    load_benchmark,
+    short_fingerprints,
+)
 from semgrid_eval.sources.town.convert import changed_versions, config_of
 from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
 
 
-def rendered(size: SizeName, cache: Path, count: int) -> dict[str, tuple[str, str]]:
-    """Render `count` recordings spread over a size of town-v1; return what is found and published by split and name."""
-    benchmark, workers = load_benchmark("town-v1"), available_cores()
+def rendered(benchmark: Benchmark, size: SizeName, cache: Path, count: int) -> dict[str, tuple[str, str]]:
+    """Render `count` recordings spread over a size; return what is found and published by split and name."""
+    workers = available_cores()
     config, dataset = config_of(benchmark, size), benchmark.dataset(size)
     plans = plan_recordings(config, cache, silent, workers=workers, dataset=dataset)
     by_label = {f"{plan.split}/{plan.name}": plan for plan in plans}
@@ -51,16 +58,20 @@ def _fingerprint(plan: RecordingPlan, folder: Path) -> str:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--benchmark", choices=BENCHMARKS, default=BENCHMARKS[0])
     parser.add_argument("--size", choices=SIZES, default="small")
     parser.add_argument("--cache", type=Path, required=True, help="folder of towns")
     parser.add_argument("--recordings", type=int, default=30)
     given = parser.parse_args()
+    benchmark = load_benchmark(given.benchmark)
+    if given.size not in benchmark.sizes:
+        raise SystemExit(f"Error: {benchmark.name} has no size {given.size}")
     try:
-        found = rendered(given.size, given.cache, given.recordings)
+        found = rendered(benchmark, given.size, given.cache, given.recordings)
     except SemgridError as error:
         raise SystemExit(f"Error: {error}") from None
     for label, (here, published) in found.items():
         print(label, here, "as published" if here == published else f"differs from the published {published}")
-    for what, (theirs, ours) in changed_versions(load_benchmark("town-v1").sizes[given.size].versions).items():
+    for what, (theirs, ours) in changed_versions(benchmark.sizes[given.size].versions).items():
         print(f"published were made with {what} {theirs}, here {ours}")
     raise SystemExit(any(here != published for here, published in found.values()))

@@ -48,7 +48,8 @@ class Draws:
 
     def find(self, log: LogReader, config: GridConfig, times: WindowTimes) -> Votes:
         """Draw the targets of a log's windows, as `Truth` says: -> (N, C, H, W)."""
-        redrawing, camera = redrawing_of(log), _camera_of(log, config)
+        camera = _camera_of(log, config)
+        redrawing = redrawing_of(log, camera)
         exact = _ExactPictures(log, camera)
         motion = EgoMotion(log.motion(), config.integrator)
         found = np.zeros((len(times.target_ns), *no_points(config).shape), np.uint8)

@@ -108,7 +108,7 @@ class Row(Config):
             raise ValueError("disturb: a row that is told of the truth has no inputs to disturb")
         if self.answers_in is not None:
             raise ValueError("disturb: answers that were made elsewhere have no inputs to disturb")
-        self.disturb.check(self.window.inputs)
+        self.disturb.check(self.window.inputs, self.sensors)
 
     def _check_stream(self) -> None:
         if self.stream is None:

@@ -15,12 +15,14 @@ import semgrid_eval
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.files import digest_value, read_json
 
-BENCHMARKS = ("town-v1",)
+BENCHMARKS = ("town-v1", "town-rig-v1")
 FINGERPRINT_CHARACTERS = 8
 """Of each recording's fingerprint that are published; enough to tell which recordings differ."""
 
 Stereo = Literal["modelled", "matched", "exact"]
 """Where disparity comes from; `exact` has no errors of labels and motion either."""
+RigName = Literal["front", "surround", "front+lidar", "surround+lidar"]
+"""Which sensors the vehicle has."""
 SizeName = Literal["small", "full"]
 SIZES: tuple[SizeName, ...] = get_args(SizeName)
 
@@ -52,7 +54,8 @@ class Benchmark(Config):
     name: str  # of the benchmark
     width: int  # of the images in pixels
     height: int  # of the images in pixels
-    stereo: Stereo  # as in `SyntheticConfig`, likewise the next two
+    stereo: Stereo  # as in `SyntheticConfig`, likewise all that follow but the sizes
+    rig: RigName = "front"
     town_size_m: float  # side of the square that a town's streets cover
     duration_s: float  # simulated time of a town
     sizes: dict[SizeName, BenchmarkSize]  # by name

@@ -46,6 +46,7 @@ SOURCES = {
     "kitti": Known("semgrid_eval.sources.kitti.source:SOURCE", "KITTI's and SemanticKITTI's sequences."),
     "ros2": Known("semgrid_eval.sources.ros2.source:SOURCE", "ROS 2 bags, by a map of their topics."),
     "town-v1": Known("semgrid_eval.sources.town.source:TOWN_V1", "A frozen data set of the simulated town."),
+    "town-rig-v1": Known("semgrid_eval.sources.town.source:TOWN_RIG_V1", "Likewise, with four cameras and a LiDAR."),
 }
 
 

@@ -32,11 +32,14 @@ class Redrawing(Protocol):
 
 
 REDRAWN = {"plan.json": "semgrid_eval.sources.town.redrawing:of_log"}
-"""What draws the errors of a log again, as `module:function` of an open log, by the attachment that it needs."""
+"""What draws the errors of a camera again, as `module:function` of an open log and the camera's name.
+
+They are found by the attachment that they need.
+"""
 
 
-def redrawing_of(log: LogReader) -> Redrawing:
-    """Find what draws a log's errors again.
+def redrawing_of(log: LogReader, camera: str) -> Redrawing:
+    """Find what draws the errors of a log's camera again.
 
     Raises:
         UnknownTruthError: the log does not say how its errors came about.
@@ -46,7 +49,7 @@ def redrawing_of(log: LogReader) -> Redrawing:
     for name, place in REDRAWN.items():
         if name in attachments:
             module, _, function = place.partition(":")
-            found: Redrawing = getattr(importlib.import_module(module), function)(log)
+            found: Redrawing = getattr(importlib.import_module(module), function)(log, camera)
             return found
     fault = "holds no exact pictures whose errors can be drawn again: simulated logs do, recordings of sensors do not"
     raise UnknownTruthError(fault, path=log.path)

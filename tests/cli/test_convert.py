@@ -126,7 +126,15 @@ def test_help_works_though_the_synthetic_extra_is_missing(monkeypatch, capsys):
 
 
 def test_sources_are_listed():
-    assert command.list_commands(None) == ["cityscapes", "synthetic", "argoverse2", "kitti", "ros2", "town-v1"]
+    assert command.list_commands(None) == [
+        "cityscapes",
+        "synthetic",
+        "argoverse2",
+        "kitti",
+        "ros2",
+        "town-v1",
+        "town-rig-v1",
+    ]
 
 
 @pytest.mark.skipif(

@@ -140,6 +140,19 @@ def test_logs_that_do_not_belong_are_a_warning(rendered, define, tmp_path, capsy
     assert f"Warning: {tmp_path} holds 1 logs that do not belong to this conversion, such as {stray}" in lines
 
 
+def test_the_benchmark_of_rigs_has_their_sensors(tmp_path, monkeypatch):
+    def with_lidar(name):
+        return tiny().model_copy(update={"name": name, "rig": "front+lidar"})
+
+    monkeypatch.setattr(convert, "load_benchmark", with_lidar)
+    _, *options = benchmark_options(tmp_path, 1)
+    done = CliRunner().invoke(cli, ["convert", "town-rig-v1", *options])
+    assert done.exit_code == 0, done.output
+    with LogReader(tmp_path / f"{LABELS[0]}.mcap") as log:
+        assert (log.scene.dataset, log.lidars) == ("town-rig-v1/small", ("top",))
+        assert len(list(log.sweeps("top"))) == 17
+
+
 def test_a_benchmark_has_no_options_that_would_change_it(tmp_path, capsys):
     code, lines = run(capsys, "town-v1", tmp_path, "--seed", 1)
     assert (code, lines[-1]) == (2, "Error: No such option '--seed'. Did you mean '--size'?")

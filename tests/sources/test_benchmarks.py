@@ -33,6 +33,14 @@ def test_sizes_are_those_of_the_paper_s_data_and_of_a_desktop():
     assert counts == {"small": (300, 120), "full": (2975, 500)}
 
 
+def test_the_benchmark_of_rigs_has_all_sensors_and_the_towns_of_town_v1_in_the_same_splits():
+    plain, rigged = (load_benchmark(name) for name in BENCHMARKS)
+    assert (plain.rig, rigged.rig) == ("front", "surround+lidar")
+    assert (plain.town_size_m, plain.duration_s) == (rigged.town_size_m, rigged.duration_s)
+    one, other = plain.sizes["small"], rigged.sizes["small"]
+    assert (one.seed, one.train.towns, one.val.towns) == (other.seed, other.train.towns, other.val.towns)
+
+
 @pytest.mark.parametrize("name", BENCHMARKS)
 def test_every_split_of_every_size_has_all_kinds_of_town_equally_often(name):
     for chosen in load_benchmark(name).sizes.values():
@@ -42,8 +50,8 @@ def test_every_split_of_every_size_has_all_kinds_of_town_equally_often(name):
 
 @pytest.mark.parametrize("name", BENCHMARKS)
 def test_no_size_trains_in_a_town_of_another(name):
-    seeds = [chosen.seed for chosen in load_benchmark(name).sizes.values()]
-    assert len(set(seeds)) == len(SIZES)
+    sizes = load_benchmark(name).sizes
+    assert len({chosen.seed for chosen in sizes.values()}) == len(sizes)
 
 
 def test_equal_recordings_have_the_published_digest():
@@ -68,6 +76,8 @@ def test_before_anything_is_published_there_is_nothing_to_differ_from():
     assert (found.published, found.differing) == (None, ())
 
 
-@pytest.mark.parametrize(("dataset", "count"), [("town-v1/small", 420), ("town-v1/full", 3475), ("synthetic", 0)])
+@pytest.mark.parametrize(
+    ("dataset", "count"), [("town-v1/small", 420), ("town-v1/full", 3475), ("town-rig-v1/small", 100), ("synthetic", 0)]
+)
 def test_every_recording_of_a_benchmark_is_published_with_a_fingerprint_of_its_own(dataset, count):
     assert len(published_fingerprints(dataset)) == count

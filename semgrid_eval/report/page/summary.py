@@ -14,7 +14,7 @@ from semgrid_eval.report.rows.pairing import HEADLINE, VERDICTS, Headline, verdi
 from semgrid_eval.report.rows.words import otherwise_asked, question_words
 from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, plural, signed
 from semgrid_eval.report.tables.streams import stream_sentence
-from semgrid_eval.report.tables.targets import not_compared_sentence
+from semgrid_eval.report.tables.targets import fusion_sentence, not_compared_sentence
 from semgrid_eval.report.tables.truth import way_sentence
 
 _FEW_RECORDINGS, _FEW_SEEDS = 10, 5
@@ -53,6 +53,7 @@ def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None, strea
     more = (
         stream_sentence(streams),
         way_sentence(scores, found.best),
+        fusion_sentence(rows),
         not_compared_sentence(rows),
         evidence,
     )

@@ -35,6 +35,18 @@ def not_compared_sentence(rows: Sequence[Row]) -> str:
     return f"Not compared with these, since their targets are others: {told}." if told else ""
 
 
+def fusion_sentence(rows: Sequence[Row]) -> str:
+    """Say what sensors measured the targets of the main group together; empty where one did, or it is not told."""
+    grid = main_group(rows)[0].results[0].grid
+    if grid is None or len(grid.target) < 2:
+        return ""
+    *others, last = grid.target
+    return (
+        f"Targets are what {', '.join(others)} and {last} have measured together by the times of {grid.target[0]}, "
+        "whichever of them a row has for its inputs."
+    )
+
+
 def _named(rows: Sequence[Row]) -> str:
     """Name the first rows, and count the others."""
     more = f" and {len(rows) - _MOST_NAMES} more" if len(rows) > _MOST_NAMES else ""

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from semgrid_eval.config import Config
-from semgrid_eval.sources.benchmarks import SizeName, Stereo
+from semgrid_eval.sources.benchmarks import RigName, SizeName, Stereo
 
 CACHE = ".towns"
 """Folder of towns beside logs."""
@@ -18,6 +18,10 @@ _STEREO = (
 _ERRORS = (
     "Camera and strength of errors: the same in all recordings, or drawn for each; width and height then say how many "
     "pixels images have about."
+)
+_RIG = (
+    "Sensors: a camera that looks ahead; with three more to the left, right and rear; a LiDAR on the roof beside "
+    "either. All but the front camera have clocks of their own."
 )
 _VAL_TOWNS = "Towns for validation, if it is another share than of the recordings."
 _TOWN_SIZE = "Side of the square that streets cover."
@@ -43,6 +47,7 @@ class SyntheticConfig(Config):
     width: Annotated[int, Field(ge=64, le=4096, description="Width of the images in pixels.")] = 512
     height: Annotated[int, Field(ge=32, le=2048, description="Height of the images in pixels.")] = 256
     stereo: Annotated[Stereo, Field(description=_STEREO)] = "modelled"
+    rig: Annotated[RigName, Field(description=_RIG)] = "front"
     errors: Annotated[Literal["fixed", "varied"], Field(description=_ERRORS)] = "fixed"
 
     @model_validator(mode="after")
@@ -76,3 +81,7 @@ class SizeOptions(Config):
     """Which size of a benchmark."""
 
     size: Annotated[SizeName, Field(description="Full is as large as the paper's data.")] = "small"
+
+
+class NoOptions(Config):
+    """Nothing can be chosen."""

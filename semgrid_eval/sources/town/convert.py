@@ -11,7 +11,7 @@ from semgrid_eval.log.fingerprint import fingerprints
 from semgrid_eval.log.store import SUFFIX
 from semgrid_eval.packages import installed_versions
 from semgrid_eval.sources.benchmarks import Benchmark, Comparison, SizeName, compare, load_benchmark
-from semgrid_eval.sources.town.config import CACHE, SizeOptions, SyntheticConfig
+from semgrid_eval.sources.town.config import CACHE, NoOptions, SizeOptions, SyntheticConfig
 from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import RENDER_VERSION, render_recording
 from semgrid_eval.sources.town.town import TOWN_VERSION
@@ -34,8 +34,17 @@ def convert_town(
 
 
 def convert_town_v1(options: SizeOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
-    """Write the logs of town-v1 and, if none failed, compare them with the published ones."""
-    benchmark, size = load_benchmark("town-v1"), options.size
+    """Write the logs of town-v1 as `convert_benchmark` does."""
+    return convert_benchmark(load_benchmark("town-v1"), options.size, out, work)
+
+
+def convert_town_rig_v1(_: NoOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
+    """Write the logs of town-rig-v1 as `convert_benchmark` does."""
+    return convert_benchmark(load_benchmark("town-rig-v1"), "small", out, work)
+
+
+def convert_benchmark(benchmark: Benchmark, size: SizeName, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
+    """Write the logs of a benchmark and, if none failed, compare them with the published ones."""
     summary = convert_town(config_of(benchmark, size), out, work, dataset=benchmark.dataset(size))
     summary.all_splits = True
     comparison = None
@@ -54,7 +63,9 @@ def config_of(benchmark: Benchmark, size: SizeName) -> SyntheticConfig:
     """Return what `plan_recordings` needs for one size of a benchmark."""
     chosen = benchmark.sizes[size]
     recordings = chosen.train.recordings + chosen.val.recordings
-    same = {name: getattr(benchmark, name) for name in ("width", "height", "stereo", "town_size_m", "duration_s")}
+    same = {
+        name: getattr(benchmark, name) for name in ("width", "height", "stereo", "rig", "town_size_m", "duration_s")
+    }
     return SyntheticConfig(
         recordings=recordings,
         seed=chosen.seed,

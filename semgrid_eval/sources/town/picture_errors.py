@@ -14,9 +14,29 @@ Float32s = NDArray[np.float32]
 Labels = NDArray[np.uint8]
 
 
+FRONT, LIDAR = "front", "top"
+_OTHERS = ("left", "right", "rear", LIDAR)
+_SENSORS = 5
+"""Which child of a recording's generator all sensors but the front camera draw from."""
+
+
 def recording_streams(seed: tuple[int, ...]) -> list[Generator]:
-    """Return a recording's random numbers for: stamps, reported motion, sunlight, errors of pictures."""
+    """Return a recording's random numbers for: stamps, reported motion, sunlight, errors of the front camera."""
     return np.random.default_rng(seed).spawn(4)
+
+
+def sensor_streams(seed: tuple[int, ...], sensor: str) -> list[Generator]:
+    """Return the random numbers of a sensor, not the front camera, for: its stamps, its errors.
+
+    They are its own, whichever other sensors there are.
+    """
+    of_sensors = np.random.default_rng(seed).spawn(_SENSORS + 1)[_SENSORS].spawn(len(_OTHERS))
+    return of_sensors[_OTHERS.index(sensor)].spawn(2)
+
+
+def error_stream(seed: tuple[int, ...], sensor: str) -> Generator:
+    """Return the random numbers for the errors of any sensor."""
+    return recording_streams(seed)[-1] if sensor == FRONT else sensor_streams(seed, sensor)[1]
 
 
 @dataclass(frozen=True)

@@ -89,6 +89,7 @@ def _plans_of_town(config: SyntheticConfig, share: _Share, folder: Path, first: 
             width_px=config.width,
             height_px=config.height,
             stereo=config.stereo,
+            rig=config.rig,
         )
         for position, chosen in enumerate(drives)
     ]

@@ -18,9 +18,10 @@ from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.redrawing import Pictures
 from semgrid_eval.sources.town.noise import DisparityNoise, LabelNoise
 from semgrid_eval.sources.town.picture_errors import (
+    FRONT,
     PictureErrors,
     Strengths,
-    recording_streams,
+    error_stream,
 )
 from semgrid_eval.sources.town.rendering import RENDER_VERSION
 
@@ -29,10 +30,12 @@ _CONTINUED, _FRESH = 0x636F6E74, 0x66726573
 
 
 class TownErrors:
-    """The errors of one recording; cheapest if it is asked for newest frames in their order."""
+    """The errors of a camera of one recording; cheapest if it is asked for newest frames in their order."""
 
-    def __init__(self, seed: tuple[int, ...], stereo: Stereo, strengths: Strengths | None = None) -> None:
-        self._seed, self._stereo, self._strengths = seed, stereo, strengths or Strengths()
+    def __init__(
+        self, seed: tuple[int, ...], stereo: Stereo, strengths: Strengths | None = None, camera: str = FRONT
+    ) -> None:
+        self._seed, self._stereo, self._strengths, self._camera = seed, stereo, strengths or Strengths(), camera
         self._errors, self._frame = self._first(), -1
 
     def continued(self, exact: Pictures, newest: int, target: int, draws: int) -> Iterator[Pictures]:
@@ -59,15 +62,15 @@ class TownErrors:
         return self._errors
 
     def _first(self) -> PictureErrors:
-        """Return the errors before the first frame, as a `Rig` begins them."""
-        disparities, labels = recording_streams(self._seed)[-1].spawn(2)
+        """Return the errors before the first frame, as a `StereoCamera` begins them."""
+        disparities, labels = error_stream(self._seed, self._camera).spawn(2)
         return PictureErrors.begin(self._stereo, self._strengths, disparities, labels)
 
     def _numbers(self, *which: int) -> list[np.random.Generator]:
         return np.random.default_rng([*which, *self._seed]).spawn(2)
 
 
-def of_log(log: LogReader) -> TownErrors:
+def of_log(log: LogReader, camera: str) -> TownErrors:
     """Read the plan of a recording, as `redrawing_of` does."""
     try:
         plan = json.loads(log.attachments()["plan.json"])
@@ -83,7 +86,7 @@ def of_log(log: LogReader) -> TownErrors:
     if stereo == "matched":
         fault = "its disparity comes from matching pictures, and such errors cannot be drawn again"
         raise UnknownTruthError(fault, path=log.path, field="plan.json")
-    return TownErrors(seed, stereo, strengths)
+    return TownErrors(seed, stereo, strengths, camera)
 
 
 def _strengths(drawn: Mapping[str, Any] | None) -> Strengths:

@@ -1,6 +1,7 @@
-"""A simulated camera: pinhole rays cast with Embree at the town's triangles and an analytic ground plane."""
+"""Rays cast with Embree at the town's triangles and an analytic ground plane, and those of a pinhole camera."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -43,9 +44,9 @@ def cityscapes_camera(width_px: int, height_px: int) -> CameraCalibration:
 
 @dataclass(frozen=True)
 class View:
-    """What a camera sees, one row a pixel, row by row (N = H * W)."""
+    """What an eye sees, one row a ray; of a camera a pixel, row by row (N = H * W)."""
 
-    depth_m: Float32s  # (N,) along the optical axis, infinite for the sky
+    depth_m: Float32s  # (N,) in lengths of the ray (of a camera along its optical axis), infinite for the sky
     points_m: Float32s  # (N, 3) what is seen, in the frame of the stage; of the sky, something far away
     label: NDArray[np.uint8]  # (N,) Cityscapes label id
     instance: NDArray[np.uint16]  # (N,) actor id, 0 where there is none
@@ -53,8 +54,29 @@ class View:
     triangle: NDArray[np.int32]  # (N,) index of the triangle that is seen, `NO_TRIANGLE` where it is ground or sky
 
 
+class Eye(ABC):
+    """A place on a vehicle from which N rays go out."""
+
+    @property
+    @abstractmethod
+    def rays_ego(self) -> Float32s:
+        """Rays (N, 3) in the vehicle frame."""
+
+    @property
+    @abstractmethod
+    def origin_ego_m(self) -> NDArray[np.float64]:
+        """The place (3,) in the vehicle frame."""
+
+    @cached_property
+    def ground_depth_m(self) -> Float32s:
+        """How far each ray (N,) gets to the ground plane, in its own lengths; infinite where it does not meet it."""
+        fall = -self.rays_ego[:, 2]
+        with np.errstate(divide="ignore"):
+            return np.where(fall > 0.0, self.origin_ego_m[2] / fall, np.inf).astype(np.float32)
+
+
 @dataclass(frozen=True)
-class Camera:
+class Camera(Eye):
     """A pinhole camera on a vehicle; pixels are numbered row by row (N = H * W)."""
 
     calibration: CameraCalibration
@@ -74,13 +96,6 @@ class Camera:
     def origin_ego_m(self) -> NDArray[np.float64]:
         """The optical centre (3,) in the vehicle frame."""
         return np.array([self.calibration.x_m, self.calibration.y_m, self.calibration.z_m])
-
-    @cached_property
-    def ground_depth_m(self) -> Float32s:
-        """Depth (N,) at which each ray meets the ground plane, infinite where it does not."""
-        fall = -self.rays_ego[:, 2]
-        with np.errstate(divide="ignore"):
-            return np.where(fall > 0.0, self.origin_ego_m[2] / fall, np.inf).astype(np.float32)
 
     def disparity_px(self, depth_m: Float32s) -> Float32s:
         """Return the disparity of depths; that of the sky is 0."""
@@ -126,31 +141,31 @@ def cast_at_all(
 
 
 def look(
-    camera: Camera,
+    eye: Eye,
     pose: Pose,
     casters: Sequence[RayCaster],
     soup: Soup,
     ground: Ground,
     stage_m: tuple[float, float] = (0.0, 0.0),
 ) -> View:
-    """Cast one ray a pixel.
+    """Cast the rays of an eye.
 
     The soup's triangles, which the casters hold, are in the frame of the stage. Its origin is `stage_m` (x, y) in the
     map frame, near the vehicle, where single precision is exact enough.
     """
-    rays = _turned(camera.rays_ego, pose.yaw_rad)
+    rays = _turned(eye.rays_ego, pose.yaw_rad)
     offset_m = (pose.x_m - stage_m[0], pose.y_m - stage_m[1], 0.0)
-    origin_m = (_turned(camera.origin_ego_m[None], pose.yaw_rad)[0] + offset_m).astype(np.float32)
+    origin_m = (_turned(eye.origin_ego_m[None], pose.yaw_rad)[0] + offset_m).astype(np.float32)
     origins_m = np.ascontiguousarray(np.broadcast_to(origin_m, rays.shape))
-    reached_m, triangle = cast_at_all(casters, origins_m, rays, np.minimum(camera.ground_depth_m, MAX_DEPTH_M))
+    reached_m, triangle = cast_at_all(casters, origins_m, rays, np.minimum(eye.ground_depth_m, MAX_DEPTH_M))
     is_open = triangle == NO_TRIANGLE
     points_m = rays * reached_m[:, None]
     points_m += origin_m
     surface = ground.at(points_m[:, 0] + np.float32(stage_m[0]), points_m[:, 1] + np.float32(stage_m[1]))
-    behind = np.where(np.isinf(camera.ground_depth_m), np.uint8(_SKY), SURFACE_LABELS[surface])
+    behind = np.where(np.isinf(eye.ground_depth_m), np.uint8(_SKY), SURFACE_LABELS[surface])
     nobody = np.zeros(len(rays), np.uint16)
     return View(
-        depth_m=np.where(is_open, camera.ground_depth_m, reached_m),
+        depth_m=np.where(is_open, eye.ground_depth_m, reached_m),
         points_m=points_m,
         label=np.where(is_open, behind, soup.label[triangle]) if len(soup) else behind,
         instance=np.where(is_open, nobody, soup.instance[triangle]) if len(soup) else nobody,

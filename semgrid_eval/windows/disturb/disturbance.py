@@ -56,5 +56,5 @@ class Disturbance(Config, ABC):
     def apply(self, inputs: Inputs) -> Inputs:
         """Return the inputs as a model sees them."""
 
-    def check(self, inputs: int) -> None:
-        """Refuse a number of inputs that cannot be disturbed like this, by a ValueError."""
+    def check(self, inputs: int, sensors: tuple[str, ...]) -> None:
+        """Refuse a number of inputs, or sensors, that cannot be disturbed like this, by a ValueError."""

@@ -8,12 +8,14 @@ from semgrid_eval.config import of_kind
 from semgrid_eval.windows.disturb.disturbance import Disturbance
 from semgrid_eval.windows.disturb.late_input import LateInput
 from semgrid_eval.windows.disturb.lost_frame import LostFrame
+from semgrid_eval.windows.disturb.lost_sensor import LostSensor
 from semgrid_eval.windows.disturb.mislabelled import Mislabelled
 from semgrid_eval.windows.disturb.reversed_order import ReversedOrder
 from semgrid_eval.windows.disturb.yaw_rate_bias import YawRateBias
 
 KINDS: dict[str, type[Disturbance]] = {
     "lost_frame": LostFrame,
+    "lost_sensor": LostSensor,
     "mislabelled": Mislabelled,
     "yaw_rate_bias": YawRateBias,
     "late_input": LateInput,

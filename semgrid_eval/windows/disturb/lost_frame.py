@@ -24,7 +24,7 @@ class LostFrame(Disturbance):
         count = f"{self.strength} " if self.strength > 1 else ""
         return f"{self.which} {count}input{'s' if self.strength > 1 else ''} lost"
 
-    def check(self, inputs: int) -> None:
+    def check(self, inputs: int, sensors: tuple[str, ...]) -> None:
         """Refuse to lose more than there is."""
         if self.strength > inputs:
             raise ValueError(f"disturb.strength: {self.strength} frames cannot be lost of {inputs} inputs")

@@ -25,7 +25,7 @@ class ReversedOrder(Disturbance):
         share = "" if self.strength == 1 else f" in {100 * self.strength:g}% of the windows"
         return f"inputs in reversed order{share}"
 
-    def check(self, inputs: int) -> None:
+    def check(self, inputs: int, sensors: tuple[str, ...]) -> None:
         """Refuse what has no order."""
         if inputs < 2:
             raise ValueError("disturb.kind: one input has no order that could be reversed")

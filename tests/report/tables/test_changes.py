@@ -8,7 +8,7 @@ from support.scoring import score_rows
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.tables.scores import changes_table
-from semgrid_eval.report.tables.targets import not_compared_sentence, not_compared_table
+from semgrid_eval.report.tables.targets import fusion_sentence, not_compared_sentence, not_compared_table
 
 MODELS = ("BL", "ED")
 
@@ -74,6 +74,18 @@ def test_the_known_area_of_other_targets_is_set_against_the_main_ones(tmp_path):
     known = [int(row.results[0].counts[:, 1:].sum()) for row in rows]
     assert (line.header, line.cells[2].text) == ("BL-fine", f"{known[2] / 4 * 0.16:,.0f} m\N{SUPERSCRIPT TWO}")
     assert line.cells[2].note == f"{known[2] / known[0] / 4:.1%} of BL-DC's"
+
+
+def test_the_page_says_where_targets_are_of_several_sensors(run):
+    row, *_ = load_runs([run])[0].rows
+
+    def said(*target):
+        grid = GridConfig(target=target).model_dump(mode="json")
+        return fusion_sentence([_with_config(row, "one", grid=grid)])
+
+    sensors = "what split1_upper, split1_lower and split2_upper have measured together by the times of split1_upper"
+    assert sensors in said("split1_upper", "split1_lower", "split2_upper")
+    assert said("full") == fusion_sentence([row]) == ""
 
 
 def test_logs_that_differ_are_a_reason_not_to_compare(tmp_path):

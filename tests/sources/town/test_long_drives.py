@@ -17,12 +17,11 @@ from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.sensors.camera import CameraSensor
-from semgrid_eval.sources.town import rendering
+from semgrid_eval.sources.town import rendering, stage
 from semgrid_eval.sources.town.config import SyntheticConfig
 from semgrid_eval.sources.town.drives import FRAME_RATE_HZ, ego_path
 from semgrid_eval.sources.town.rendering import render_recording
 from semgrid_eval.sources.town.sensors import Camera, cityscapes_camera
-from semgrid_eval.sources.town.shading import draw_sunlight
 from semgrid_eval.sources.town.town import load_town
 
 FRAMES = 120
@@ -66,19 +65,16 @@ def test_the_length_is_part_of_a_plan_and_leaves_those_of_thirty_frames_alone(pl
 
 
 def test_the_town_is_as_whole_at_the_end_as_around_a_place_of_its_own(plan, monkeypatch):
-    monkeypatch.setattr(rendering, "_SIGHT_M", 60.0)
+    monkeypatch.setattr(stage, "_SIGHT_M", 60.0)
     start_m, end_m = ends(plan)
     assert math.dist(start_m, end_m) > 40.0
     town, camera = load_town(plan.town), Camera(cityscapes_camera(128, 64), 128, 64)
     path, time_s = ego_path(town.traffic, plan.drive), plan.drive.start_s + FRAMES / FRAME_RATE_HZ
     pose = Pose(0, *at(plan, FRAMES))
     passed = rendering._places(path, np.linspace(plan.drive.start_s, time_s, FRAMES))
-    stages = [
-        rendering.Stage(town, [camera], draw_sunlight(np.random.default_rng(0)), places)
-        for places in ([end_m], passed, [start_m])
-    ]
+    stages = [stage.Stage(town, places) for places in ([end_m], passed, [start_m])]
     others = stages[0].others(time_s, pose, plan.drive.actor)
-    wanted, found, begun = (stage.pictures(others, time_s, pose)[0][0] for stage in stages)
+    wanted, found, begun = (each.scenery(others, time_s, pose).seen_by(camera) for each in stages)
     near = wanted.depth_m < 19.0  # the last place is at most 40 m behind
     assert (found.label == wanted.label)[near].all()
     assert not (begun.label == wanted.label)[wanted.depth_m < 58.0].all()  # what was there at first does not suffice

@@ -25,8 +25,8 @@ from semgrid_eval.sources.town.picture_errors import (
 )
 from semgrid_eval.sources.town.redrawing import TownErrors
 from semgrid_eval.sources.town.rendering import render_recording
-from semgrid_eval.sources.town.rig import Rig
 from semgrid_eval.sources.town.sensors import Camera, View
+from semgrid_eval.sources.town.stereo_camera import StereoCamera
 from semgrid_eval.sources.town.varied import fixed_conditions
 
 SEED = (5, 0, 2, 1)
@@ -53,9 +53,9 @@ def view(frame: int) -> View:
 def test_a_branch_that_goes_on_by_the_same_random_numbers_is_the_recording_byte_for_byte():
     camera = Camera(calibration(), WIDTH, HEIGHT)
     conditions = replace(fixed_conditions(WIDTH, HEIGHT), calibration=calibration())
-    rig = Rig(conditions, "modelled", recording_streams(SEED)[-1])
+    stereo = StereoCamera(conditions, "modelled", recording_streams(SEED)[-1])
     image = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    own = [rig.frame(frame, [(view(frame), image)]) for frame in range(7)]
+    own = [stereo.frame(frame, [(view(frame), image)]) for frame in range(7)]
 
     numbers = recording_streams(SEED)[-1].spawn(2)
     errors = PictureErrors.begin("modelled", Strengths(), *numbers)
@@ -88,7 +88,7 @@ def exact(frame) -> Pictures:
 
 def test_a_log_tells_its_own_errors_up_to_the_rounding_of_its_exact_disparity(log):
     with LogReader(log) as reader:
-        errors, frames = redrawing_of(reader), list(reader.frames("front"))
+        errors, frames = redrawing_of(reader, "front"), list(reader.frames("front"))
     for number in (0, 4, 11):
         pictures = exact(frames[number])
         state = errors.after(number - 1, pictures)
@@ -134,7 +134,7 @@ def test_several_frames_at_once_keep_as_much_of_an_error_as_one_after_the_other(
 
 def test_continued_draws_are_nearer_to_the_recording_than_fresh_ones(log):
     with LogReader(log) as reader:
-        errors, frames = redrawing_of(reader), list(reader.frames("front"))
+        errors, frames = redrawing_of(reader, "front"), list(reader.frames("front"))
     pictures, own = exact(frames[6]), decode_gray(frames[6].disparity_png, bit_depth=16).astype(float)
 
     def off(drawn):
@@ -155,7 +155,7 @@ def test_logs_that_cannot_be_drawn_again_say_why(tmp_path):
     toy = tmp_path / "toy.mcap"
     write_log(street(frames=2).recording(), toy)
     with LogReader(toy) as reader, pytest.raises(UnknownTruthError, match="holds no exact pictures whose errors"):
-        redrawing_of(reader)
+        redrawing_of(reader, "front")
     plan = small_plans()[0]
     cases = {
         "matched": ({"stereo": "matched"}, UnknownTruthError, "comes from matching"),
@@ -170,4 +170,4 @@ def test_logs_that_cannot_be_drawn_again_say_why(tmp_path):
         files = {"plan.json": json.dumps(described).encode()}
         write_log(replace(recording, source_files=files, source_digest=digest), path)
         with LogReader(path) as reader, pytest.raises(error, match=message):
-            redrawing_of(reader)
+            redrawing_of(reader, "front")

@@ -19,7 +19,8 @@ from semgrid_eval.sources.town.config import SyntheticConfig
 from semgrid_eval.sources.town.drives import Drive
 from semgrid_eval.sources.town.noise import DisparityNoise, LabelNoise
 from semgrid_eval.sources.town.recordings import plan_recordings
-from semgrid_eval.sources.town.rendering import RecordingPlan, in_sight, render_recording
+from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
+from semgrid_eval.sources.town.stage import in_sight
 from semgrid_eval.sources.town.traffic import Snapshot
 from semgrid_eval.sources.town.varied import RANGES, Range, draw_conditions, fixed_conditions
 

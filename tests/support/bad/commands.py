@@ -68,10 +68,12 @@ convert synthetic out --recordings 2 --height 5000
 convert synthetic out --recordings 2 --stereo guessed
 convert synthetic out --recordings 2 --duration-s 1
 convert synthetic out --recordings 2 --errors none
+convert synthetic out --recordings 2 --rig back
 convert synthetic out --recordings 2 --split test
 convert town-v1 out --size medium
 convert town-v1 out --split test
 convert town-v1 out --cache file.txt
+convert town-rig-v1 out --rig front
 check
 check nowhere
 check empty

@@ -160,6 +160,9 @@ model: newest, disturb: {kind: late_input, speed: 1}
 model: newest, disturb: {kind: late_input, seed: -1}
 model: newest, disturb: {kind: lost_frame, strength: 3}
 model: newest, disturb: {kind: lost_frame, which: middle}
+model: newest, disturb: {kind: lost_sensor, sensors: [rear]}
+model: newest, disturb: {kind: lost_sensor, sensors: []}
+model: newest, disturb: {kind: lost_sensor}
 model: newest, disturb: {kind: mislabelled, strength: 1.1}
 model: newest, disturb: {kind: mislabelled, patch_m: 0}
 model: newest, disturb: {kind: reversed_order}, window: {inputs: 1}

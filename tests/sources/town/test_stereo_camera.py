@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 from support.cameras import calibration
 
-from semgrid_eval.sources.town.rig import StereoMatcher, right_of
 from semgrid_eval.sources.town.sensors import Camera, cityscapes_camera
+from semgrid_eval.sources.town.stereo_camera import StereoMatcher, right_of
 
 CAMERA = Camera(cityscapes_camera(512, 256), 512, 256)
 
