@@ -105,12 +105,9 @@ def plot_grid(
     mask: NDArray[np.bool_] | None = None,
     spec: GridSpec | None = None,
     classes: ClassSet = DEFAULT_CLASSES,
-    axes: "Axes | None" = None,
+    axes: "Axes | None" = None,  # those of a new figure if not given
 ) -> "Axes":
-    """Draw a grid (H, W) of class ids in the report's colours, in metres around the vehicle, mask M (H, W) in white.
-
-    It is drawn on `axes`, those of a new figure if not given.
-    """
+    """Draw a grid (H, W) of class ids in the report's colours, in metres around the vehicle, mask M (H, W) in white."""
     from semgrid_eval.report.figures.grid import draw_grid  # so that matplotlib is imported only to plot
 
     return draw_grid(grid, mask=mask, spec=spec or GridSpec(), classes=classes, axes=axes)
@@ -140,8 +137,7 @@ def score(
     flat = (-1, *shape[-2:])
     seen, guessed = (np.asarray(grid, np.uint8).reshape(flat) for grid in (target, prediction))
     counts, iou = confusion(seen, guessed, left_out.reshape(flat), classes.count), iou_of(classes)
-    figures = iou.figures(iou.ratios(counts.sum(axis=0)))
-    return dict(zip(iou.labels, figures.tolist(), strict=True))
+    return dict(zip(iou.labels, iou.figures(iou.ratios(counts.sum(axis=0))).tolist(), strict=True))
 
 
 def make_windows(

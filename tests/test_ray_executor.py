@@ -10,6 +10,7 @@ from support.pieces import environment, fit_alone, square_or_die
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import InProcess, WorkerDied, thread_variables
+from semgrid_eval.scores.sums import read_sums
 
 ray = pytest.importorskip("ray", reason="the extra 'ray' is not installed")
 ray.cloudpickle.register_pickle_by_value(pieces)  # the cluster's processes cannot import it
@@ -174,8 +175,7 @@ def test_ray_gives_the_same_bytes_as_this_process(tmp_path):
         record = run_matrix(matrix, tmp_path / "logs", tmp_path / name, options)
         assert [row.failure for row in record.rows] == [None] * 3
         counts[name] = [
-            results.read_sums(results.result_folder(tmp_path / name, r.results[0]), "iou", "all")[:, 0]
-            for r in record.rows
+            read_sums(results.result_folder(tmp_path / name, r.results[0]), "iou", "all")[:, 0] for r in record.rows
         ]
     executor.close()
     for here, there in zip(*counts.values(), strict=True):

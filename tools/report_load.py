@@ -18,6 +18,7 @@ from semgrid_eval.scores import results
 from semgrid_eval.scores.facts import RowFacts
 from semgrid_eval.scores.metrics.metric import ScoredWindows
 from semgrid_eval.scores.metrics.table import Sums, count_windows
+from semgrid_eval.scores.sums import write_sums
 
 CLASSES = 10
 SPEC = GridSpec(rows=32, columns=32, agent_row=32, agent_column=16)
@@ -92,7 +93,7 @@ def _row(
         folder = results.result_folder(run, result_id)
         # Windows in another order and a little thinned out are as good as new predictions.
         order, kept = generator.permutation(len(windows)), generator.uniform(0.9, 1.0)
-        results.write_sums(folder, {key: (sums[order] * kept).astype(np.int32) for key, sums in base.items()})
+        write_sums(folder, {key: (sums[order] * kept).astype(np.int32) for key, sums in base.items()})
         results.write_result(folder, _result(result_id, seed, facts, windows))
         ids.append(result_id)
     name = "BL-DC" if number == 0 else f"ED-{number}"

@@ -34,6 +34,7 @@ from semgrid_eval.runs.truth import EXPECTED, expected_target, parts_of, told
 from semgrid_eval.runs.watch import unchanged
 from semgrid_eval.scores import results
 from semgrid_eval.scores.evaluate import Evaluation, evaluate
+from semgrid_eval.scores.sums import EXPECTED_FILE, write_sums
 from semgrid_eval.streams.evaluate import Unseen, evaluate_stream
 from semgrid_eval.streams.plan import StreamPlan
 from semgrid_eval.windows.data import WindowSet, window_arrays
@@ -280,9 +281,9 @@ def _keep_result(
     folder: Path, record: results.ResultRecord, evaluation: Evaluation, history: Path | None, *, with_predictions: bool
 ) -> None:
     with atomic_folder(folder) as partial:
-        results.write_sums(partial, evaluation.sums, record.id)
+        write_sums(partial, evaluation.sums, record.id)
         if evaluation.expected_sums is not None:
-            results.write_sums(partial, evaluation.expected_sums, record.id, results.EXPECTED_FILE)
+            write_sums(partial, evaluation.expected_sums, record.id, EXPECTED_FILE)
         if with_predictions:
             arrays = {"prediction": evaluation.prediction, "certainty": evaluation.certainty}
             file = results.STREAM_FILE if evaluation.stream else results.PREDICTIONS_FILE

@@ -13,7 +13,8 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.scores.metrics.metric import Metric, Partition, column_names
 from semgrid_eval.scores.metrics.table import METRICS, metrics_of
 from semgrid_eval.scores.regions.table import PARTITIONS
-from semgrid_eval.scores.results import ResultRecord, read_result, read_run, read_sums, result_folder
+from semgrid_eval.scores.results import ResultRecord, read_result, read_run, result_folder
+from semgrid_eval.scores.sums import read_sums
 
 FIGURE_COLUMNS = ("row", "seed", "metric", "division", "region", "column", "value", "cells", "windows")
 WINDOW_COLUMNS = ("row", "seed", "recording", "window", "metric", "division", "region", "ratio")

@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import shutil
 
 import numpy as np
 import pandas as pd
@@ -19,6 +20,7 @@ from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
 from semgrid_eval.log.store import write_log
 from semgrid_eval.models.model import Given
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import read_sums
 from semgrid_eval.scores.tidy import load_figures
 
 NAMES = ("unknown", "drivable", "walkable", "fixed", "vehicle", "pedestrian")
@@ -61,7 +63,7 @@ def test_results_name_the_set_and_are_counted_by_it(place):
     for record in found.values():
         assert record.classes == load_classes(place / "my_classes.yaml")
         folder = place / "runs/own/results" / record.id
-        counts = results.read_sums(folder, "iou", "all", record.classes)
+        counts = read_sums(folder, "iou", "all", record.classes)
         assert counts.shape == (1, 1, 6, 6)
         windows = results.read_windows(place / "runs/own", record.windows_id)
         predicted = results.read_predictions(folder)["prediction"]
@@ -154,11 +156,15 @@ def test_a_result_whose_classes_are_none_is_named_and_the_rest_goes_on(place, mo
 
 def test_a_gate_knows_their_figures(place, monkeypatch):
     monkeypatch.chdir(place)
-    report = "semgrid-eval report runs/own runs/own --out gate --fail-below"
+    shutil.copytree("runs/own", "runs/again")
+    report = "semgrid-eval report runs/own runs/again --out gate --fail-below"
     refused = run(f"{report} 'road: -0.01'")
     assert refused.code == 1
     assert "fail-below: 'road' is not one of unknown, drivable, " in refused.err
-    assert "row newest has one recording: an interval needs more" in run(f"{report} 'surface: -0.01'").err
+    assert (
+        "row newest: one recording alone has cells of surface: an interval needs more"
+        in run(f"{report} 'surface: -0.01'").err
+    )
 
 
 def test_the_default_set_is_printed_to_begin_with():

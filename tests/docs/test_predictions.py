@@ -12,6 +12,7 @@ from support.toy_world import street
 
 from semgrid_eval.log.store import write_log
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import read_sums
 
 PAGE = text_of("docs/predictions.md")
 
@@ -35,7 +36,7 @@ def test_the_example_writes_logs_that_its_rows_score(tmp_path, monkeypatch):
     scored = {row.name: results.result_folder(tmp_path / "runs/first", row.results[0]) for row in record.rows}
     stream = results.read_result(scored["NODE-live"]).stream
     assert (stream.latency_ms, stream.lead_ms, stream.misses) == (90.0, 300.0, 3)
-    counts = {name: results.read_sums(folder, "iou", "all") for name, folder in scored.items()}
+    counts = {name: read_sums(folder, "iou", "all") for name, folder in scored.items()}
     np.testing.assert_array_equal(counts["NODE"], counts["BL-DC"])  # straight on at one speed, it expects the way
     assert (counts["NODE"] != counts["BL-NT"]).any()
     exec(export, {})

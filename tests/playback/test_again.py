@@ -10,6 +10,7 @@ from support.exact_grids import read_exact
 from support.small_runs import WINDOW, run, write_logs
 from support.toy_world import FRAME_NS, START_NS
 
+from semgrid_eval.arrays import write_arrays
 from semgrid_eval.classes import DEFAULT_CLASSES
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.grids.extent import extent_of
@@ -152,7 +153,7 @@ def test_a_scored_window_stays_as_it_was_scored_and_a_difference_is_told(made, p
     )
     arrays = results.read_predictions(folder)
     arrays["prediction"][:, :64] = 0
-    results.write_arrays(folder / results.PREDICTIONS_FILE, arrays, owner=folder.name)
+    write_arrays(folder / results.PREDICTIONS_FILE, arrays, owner=folder.name)
     written = play("ed", run=tmp_path / "run")
     assert f"of the cells of the windows that were scored of {RECORDING} would be predicted otherwise here" in " ".join(
         written.notes

@@ -21,6 +21,7 @@ from semgrid_eval.log.store import write_log
 from semgrid_eval.playback.write import Play, write_playback
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import read_sums
 
 FRAMES, LATE_NS = 12, FRAME_NS * 3 // 2 + 1
 WINDOW = {"inputs": 1, "step_frames": 2, "target_frame": None}
@@ -143,8 +144,7 @@ def test_a_stream_that_was_played_scores_as_recorded_answers_to_the_count(made, 
     assert run([row], made / "logs", tmp_path / "run", window=WINDOW).rows[0].failure is None
     (folder,) = (tmp_path / "run" / "results").iterdir()
     expected, found = (
-        results.read_sums(each, "iou", "all")
-        for each in (results.result_folder(made / "run", record(made, name).id), folder)
+        read_sums(each, "iou", "all") for each in (results.result_folder(made / "run", record(made, name).id), folder)
     )
     np.testing.assert_array_equal(found, expected)
 

@@ -14,6 +14,7 @@ from support.exact_grids import read_exact
 from support.independent_reader import of_topic, read, reader_script, sha256
 from support.toy_world import FRAME_NS, street
 
+from semgrid_eval.arrays import write_arrays
 from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, SemgridError
 from semgrid_eval.log.codec import stamp_ns
@@ -245,7 +246,7 @@ def test_arrays_of_another_shape_are_refused(run, tmp_path):
     shutil.copytree(run, copy)
     for path in copy.glob("windows/*.npz"):
         arrays = results.read_arrays(path, ("inputs", "target", "mask"))
-        results.write_arrays(path, {**arrays, "target": arrays["target"][:, :-1]}, owner=path.stem)
+        write_arrays(path, {**arrays, "target": arrays["target"][:, :-1]}, owner=path.stem)
     with pytest.raises(InputError, match=r"target: has shape \(16, 127, 128\), not \(16, 128, 128\)"):
         write(copy, "BL-DC", tmp_path / "play.mcap")
 

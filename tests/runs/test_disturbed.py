@@ -11,6 +11,7 @@ from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.row import units_of
 from semgrid_eval.runs.runner import RunOptions, make_worker
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import SUMS_FILE, read_sums
 
 KINDS = {
     "lost": {"kind": "lost_frame"},
@@ -57,7 +58,7 @@ def test_disturbed_rows_share_targets_and_mask_with_the_undisturbed_one_and_have
 def test_cells_are_divided_by_what_was_to_be_seen(done):
     out, found = done
     regions = {
-        name: results.read_sums(results.result_folder(out, result.id), "iou", "origin").sum(axis=(3,))
+        name: read_sums(results.result_folder(out, result.id), "iou", "origin").sum(axis=(3,))
         for name, result in found.items()
     }
     for counted in regions.values():
@@ -73,7 +74,7 @@ def test_a_model_is_trained_once_whatever_is_wrong_with_the_inputs_that_are_scor
 
 def test_the_newest_input_is_all_that_its_copy_has(done):
     out, found = done
-    counts = {name: results.read_sums(results.result_folder(out, found[name].id), "iou", "all")[:, 0] for name in found}
+    counts = {name: read_sums(results.result_folder(out, found[name].id), "iou", "all")[:, 0] for name in found}
     assert counts["BL-lost"][:, :, 1:].sum() == 0
     assert counts["BL"].trace(axis1=1, axis2=2).sum() > counts["BL-late"].trace(axis1=1, axis2=2).sum()
 
@@ -84,7 +85,7 @@ def test_the_same_command_gives_the_same_numbers(done, logs, tmp_path):
     run(rows, logs, tmp_path / "again")
     for name in (row["name"] for row in rows):
         (first, second) = (results.result_folder(folder, found[name].id) for folder in (out, tmp_path / "again"))
-        assert (first / results.SUMS_FILE).read_bytes() == (second / results.SUMS_FILE).read_bytes()
+        assert (first / SUMS_FILE).read_bytes() == (second / SUMS_FILE).read_bytes()
 
 
 def trainings(logs, out, rows, names):

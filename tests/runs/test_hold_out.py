@@ -10,6 +10,7 @@ from support.toy_world import street
 
 from semgrid_eval.log.store import write_log
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import read_sums
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,7 @@ def test_groups_held_out_are_scored_and_not_trained_on(logs, tmp_path):
     write_log(town("b", 1, "val"), tmp_path / "logs" / "b.mcap")
     (split,) = run([{"name": "BL-Table", "model": "table"}], tmp_path / "logs", tmp_path / "split").rows
     sums = [
-        results.read_sums(results.result_folder(tmp_path / out, row.results[0]), "iou", "all")
+        read_sums(results.result_folder(tmp_path / out, row.results[0]), "iou", "all")
         for out, row in (("run", held), ("split", split))
     ]
     assert (sums[0] == sums[1]).all()

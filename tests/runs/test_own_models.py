@@ -12,6 +12,7 @@ from semgrid_eval.models.registry import ENTRY_POINT_GROUP, own_models
 from semgrid_eval.scores import results
 from semgrid_eval.scores.metrics.iou import class_iou
 from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores.sums import read_sums
 from semgrid_eval.workplace import Limits
 
 NETWORK = """
@@ -74,7 +75,7 @@ def result_of(out, row):
 def score(out, record, name):
     row = next(row for row in record.rows if row.name == name)
     result_of(out, row)
-    counts = results.read_sums(results.result_folder(out, row.results[0]), "iou", "all")[:, 0]
+    counts = read_sums(results.result_folder(out, row.results[0]), "iou", "all")[:, 0]
     return float(IOU.means(class_iou(counts.sum(axis=0)))["mean_known"])
 
 
@@ -209,10 +210,7 @@ def test_a_model_that_declares_chance_is_repeated_with_seeds_and_each_gives_the_
         (row,) = run(rows, logs, tmp_path / name).rows
         assert [results.read_result(results.result_folder(tmp_path / name, i)).seed for i in row.results] == [5, 6]
         counts.append(
-            [
-                results.read_sums(results.result_folder(tmp_path / name, i), "iou", "all")[:, 0][0].tolist()
-                for i in row.results
-            ]
+            [read_sums(results.result_folder(tmp_path / name, i), "iou", "all")[:, 0][0].tolist() for i in row.results]
         )
     assert counts[0] == counts[1]
     assert counts[0][0] != counts[0][1]
@@ -323,7 +321,7 @@ def test_a_model_that_cheats_or_leaves_is_stopped(logs, tmp_path):
     )
     rows = [{"name": name, "model": f"{tmp_path}/bad.py:{name}"} for name in ("Peeks", "Leaves", "Ends")]
     record = run(rows, logs, tmp_path / "run")
-    counts = results.read_sums(results.result_folder(tmp_path / "run", record.rows[0].results[0]), "iou", "all")[:, 0]
+    counts = read_sums(results.result_folder(tmp_path / "run", record.rows[0].results[0]), "iou", "all")[:, 0]
     assert counts[:, :, 1:].sum() == 0  # the target that it saw was empty, and so is its answer
     assert counts.sum() > 10_000  # and its mask was not ours
     assert "raised SystemExit: 3" in str(record.rows[1].failure)
@@ -384,7 +382,7 @@ def test_a_model_with_other_weights_is_scored_again_and_cannot_move_what_others_
         record = run(rows, logs, tmp_path / "run")
         assert [row.failure for row in record.rows] == [None, None]
         for row in record.rows:
-            counts = results.read_sums(results.result_folder(tmp_path / "run", row.results[0]), "iou", "all")[:, 0]
+            counts = read_sums(results.result_folder(tmp_path / "run", row.results[0]), "iou", "all")[:, 0]
             found[row.name, known] = counts.tolist()
     assert found["Mine", 1] == found["BL", 1] == found["BL", 0]
     assert found["Mine", 0] != found["Mine", 1]
@@ -400,7 +398,5 @@ def test_models_of_two_folders_do_not_share_what_lies_beside_them(logs, tmp_path
         (folder / "mine.py").write_text(WITH_WEIGHTS)
         rows.append({"name": f"Mine{known}", "model": f"{folder}/mine.py:Mine"})
     first, second = (row.results[0] for row in run(rows, logs, tmp_path / "run").rows)
-    counts = [
-        results.read_sums(results.result_folder(tmp_path / "run", name), "iou", "all")[:, 0] for name in (first, second)
-    ]
+    counts = [read_sums(results.result_folder(tmp_path / "run", name), "iou", "all")[:, 0] for name in (first, second)]
     assert (counts[0] != counts[1]).any()

@@ -10,6 +10,7 @@ from support.small_runs import run, write_logs
 from semgrid_eval.executors import Processes
 from semgrid_eval.models.registry import described, own_models
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import read_sums
 from semgrid_eval.workplace import Limits
 
 RUDE = """
@@ -114,7 +115,7 @@ def rows_of(folder, code, *names):
 
 def sums_of(out, record, name):
     row = next(row for row in record.rows if row.name == name)
-    return [results.read_sums(results.result_folder(out, each), "iou", "all").tobytes() for each in row.results]
+    return [read_sums(results.result_folder(out, each), "iou", "all").tobytes() for each in row.results]
 
 
 ENDS = {

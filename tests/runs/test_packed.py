@@ -16,6 +16,7 @@ from semgrid_eval.runs.data import RunData
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.packed import INDEX_FILE, PackedGrids, pack_grids
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import read_sums
 
 SPLIT = ["split2_upper", "split2_lower"]
 ROWS = [
@@ -42,9 +43,7 @@ def test_a_run_on_packed_grids_is_the_run_on_logs(folders, tmp_path):
     assert from_grids.logs == from_logs.logs
     assert from_grids.rows == from_logs.rows
     for row in from_grids.rows:
-        first, second = (
-            results.read_sums(results.result_folder(tmp_path / out, row.results[0]), "iou", "all") for out in "ab"
-        )
+        first, second = (read_sums(results.result_folder(tmp_path / out, row.results[0]), "iou", "all") for out in "ab")
         assert (first == second).all()
 
 

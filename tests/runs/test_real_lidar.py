@@ -20,7 +20,8 @@ from semgrid_eval.grids.build import build_log
 from semgrid_eval.log.store import find_logs, read_recording, write_log
 from semgrid_eval.scores.metrics.iou import class_iou
 from semgrid_eval.scores.metrics.table import IOU
-from semgrid_eval.scores.results import read_run, read_sums, result_folder
+from semgrid_eval.scores.results import read_run, result_folder
+from semgrid_eval.scores.sums import read_sums
 
 LIDAR, TRACKS, CAMERAS = (os.environ.get(f"SEMGRID_REAL_{name}", "") for name in ("LIDAR", "TRACKS", "DATA"))
 needs_lidar = pytest.mark.skipif(not Path(LIDAR, "sequences").is_dir(), reason="SEMGRID_REAL_LIDAR names no sequences")

@@ -10,7 +10,8 @@ from click.testing import CliRunner
 from semgrid_eval.cli.main import cli
 from semgrid_eval.scores.metrics.iou import class_iou
 from semgrid_eval.scores.metrics.table import IOU
-from semgrid_eval.scores.results import read_run, read_sums, result_folder
+from semgrid_eval.scores.results import read_run, result_folder
+from semgrid_eval.scores.sums import read_sums
 
 REAL = os.environ.get("SEMGRID_REAL_DATA", "")
 MATRIX = {

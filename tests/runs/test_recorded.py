@@ -14,6 +14,7 @@ from semgrid_eval.playback.export import export_predictions, write_predictions
 from semgrid_eval.playback.write import Play, write_playback
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import read_sums
 
 ALL = {"step_frames": 2, "target_frame": None}
 RECORDINGS = ("toy_000002_000000", "toy_000003_000000")
@@ -52,7 +53,7 @@ def record_of(out, name):
 
 def sums_of(out, name):
     return {
-        key: results.read_sums(results.result_folder(out, record_of(out, name).id), *key)
+        key: read_sums(results.result_folder(out, record_of(out, name).id), *key)
         for key in (("iou", "all"), ("iou", "distance"), ("calibration", "all"))
     }
 

@@ -16,6 +16,7 @@ from semgrid_eval.recording.types import Actor, Pose
 from semgrid_eval.scores import results
 from semgrid_eval.scores.metrics.iou import class_iou
 from semgrid_eval.scores.metrics.table import IOU
+from semgrid_eval.scores.sums import read_sums
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,7 @@ def logs(tmp_path_factory):
 def score(out, record, name):
     row = next(row for row in record.rows if row.name == name)
     assert row.failure is None, row.failure
-    counts = results.read_sums(results.result_folder(out, row.results[0]), "iou", "all")[:, 0]
+    counts = read_sums(results.result_folder(out, row.results[0]), "iou", "all")[:, 0]
     return float(IOU.means(class_iou(counts.sum(axis=0)))["mean_known"])
 
 
@@ -65,7 +66,7 @@ def test_a_run_leaves_results_that_parse_and_belong_together(logs, tmp_path):
         windows = results.read_windows(out, result.windows_id)
         assert windows["inputs"].shape == (2, len(row.facts.sensors), 2, 128, 128)
         predictions = results.read_predictions(folder)
-        counts = results.read_sums(folder, "iou", "all")[:, 0]
+        counts = read_sums(folder, "iou", "all")[:, 0]
         for n in range(2):
             scored = ~windows["mask"][n]
             for class_id in range(len(CLASS_NAMES)):
@@ -156,7 +157,7 @@ def test_truth_in_the_logs_gives_scores_near_moving_and_standing_actors(tmp_path
         write_log(with_truth(recording, known), tmp_path / "logs" / f"toy{number}.mcap")
     record = run([{"name": "BL-DC", "model": "newest"}], tmp_path / "logs", tmp_path / "run")
     folder = results.result_folder(tmp_path / "run", record.rows[0].results[0])
-    moving, standing = np.moveaxis(results.read_sums(folder, "iou", "actors"), 1, 0)
+    moving, standing = np.moveaxis(read_sums(folder, "iou", "actors"), 1, 0)
     for counts in (moving, standing):
         assert (counts.sum(axis=(1, 2)) > 0).tolist() == [True, False]
     windows_id = results.read_result(folder).windows_id
@@ -204,7 +205,7 @@ def test_several_processes_give_the_same_bytes_as_one(logs, tmp_path):
 def test_mask_modes_differ_in_the_row_of_unknown_only(logs, tmp_path, mode):
     record = run([{"name": "BL-DC", "model": "newest", "mask_mode": mode}], logs, tmp_path / "run")
     folder = results.result_folder(tmp_path / "run", record.rows[0].results[0])
-    counts = results.read_sums(folder, "iou", "all")[:, 0]
+    counts = read_sums(folder, "iou", "all")[:, 0]
     windows_id = results.read_result(folder).windows_id
     windows = results.read_arrays(results.windows_file(tmp_path / "run", windows_id), ("mask", "target"))
     prediction = results.read_arrays(folder / "predictions.npz", ("prediction",))["prediction"]

@@ -12,6 +12,7 @@ from semgrid_eval.executors import Processes
 from semgrid_eval.report.page.write import write_report
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import read_sums
 
 STILL = {"name": "still", "model": "newest", "stream": {"latency_ms": 100, "move": False}}
 ROWS = [
@@ -72,7 +73,7 @@ def test_what_is_later_is_worse_and_moving_along_is_better(done):
     out, found = done
 
     def right(name):
-        counts = results.read_sums(results.result_folder(out, found[name].id), "iou", "all").sum(axis=(0, 1))
+        counts = read_sums(results.result_folder(out, found[name].id), "iou", "all").sum(axis=(0, 1))
         return np.trace(counts) / counts.sum()
 
     assert right("newest+0.0") > right("newest+120.0")
@@ -211,5 +212,5 @@ def test_two_processes_give_the_same_numbers_as_one(logs, tmp_path):
         record = run(rows, logs, folder, executor)
         assert [row.failure for row in record.rows] == [None, None]
     for result_id in (row.results[0] for row in record.rows):
-        sums = [results.read_sums(results.result_folder(folder, result_id), "iou", "all") for folder in folders]
+        sums = [read_sums(results.result_folder(folder, result_id), "iou", "all") for folder in folders]
         np.testing.assert_array_equal(*sums)

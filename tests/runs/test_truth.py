@@ -25,6 +25,7 @@ from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.runner import RunOptions
 from semgrid_eval.runs.truth import told
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import EXPECTED_FILE, SUMS_FILE, read_sums
 from semgrid_eval.windows.data import WindowSet
 
 TOLD = [{"name": "top", "model": "ceiling", "settings": {"draws": 5}}, {"name": "new", "model": "fresh"}]
@@ -52,9 +53,9 @@ def folder_of(out, name):
     return results.result_folder(out, row.results[0])
 
 
-def right(out, name, file=results.SUMS_FILE):
+def right(out, name, file=SUMS_FILE):
     """The share of cells that a row has right, which is what the likeliest class is best at."""
-    counts = results.read_sums(folder_of(out, name), "iou", "all", file=file)[:, 0].sum(axis=0)
+    counts = read_sums(folder_of(out, name), "iou", "all", file=file)[:, 0].sum(axis=0)
     return np.trace(counts) / counts.sum()
 
 
@@ -83,12 +84,11 @@ def test_rows_say_that_they_are_told_of_the_truth(out):
 
 
 def test_the_second_target_is_what_most_draws_of_new_errors_say(out):
-    sums = results.read_sums(folder_of(out, "same"), "iou", "all", file=results.EXPECTED_FILE)[:, 0]
+    sums = read_sums(folder_of(out, "same"), "iou", "all", file=EXPECTED_FILE)[:, 0]
     assert (sums == sums * np.eye(10, dtype=int)).all(), "15 draws of new errors are that target itself"
-    assert right(out, "BL-Fuse", results.EXPECTED_FILE) != right(out, "BL-Fuse")
+    assert right(out, "BL-Fuse", EXPECTED_FILE) != right(out, "BL-Fuse")
     measured, expected = (
-        results.read_sums(folder_of(out, "BL-DC"), "iou", "all", file=file)
-        for file in (results.SUMS_FILE, results.EXPECTED_FILE)
+        read_sums(folder_of(out, "BL-DC"), "iou", "all", file=file) for file in (SUMS_FILE, EXPECTED_FILE)
     )
     assert measured.sum(axis=-2).tolist() != expected.sum(axis=-2).tolist(), "each target has a mask of its own"
 
@@ -96,9 +96,9 @@ def test_the_second_target_is_what_most_draws_of_new_errors_say(out):
 def test_a_second_target_changes_no_score_against_the_first(out, logs, tmp_path):
     run(PLAIN, logs, tmp_path / "run")
     for name in ("BL-DC", "BL-Fuse"):
-        one, other = (results.read_sums(folder_of(each, name), "iou", "all") for each in (out, tmp_path / "run"))
+        one, other = (read_sums(folder_of(each, name), "iou", "all") for each in (out, tmp_path / "run"))
         np.testing.assert_array_equal(one, other)
-        assert not (folder_of(tmp_path / "run", name) / results.EXPECTED_FILE).exists()
+        assert not (folder_of(tmp_path / "run", name) / EXPECTED_FILE).exists()
 
 
 def test_on_logs_without_the_truth_such_rows_are_skipped_in_a_line_and_others_go_on(tmp_path):
@@ -112,7 +112,7 @@ def test_on_logs_without_the_truth_such_rows_are_skipped_in_a_line_and_others_go
             r"\S+toy2\.mcap: holds no exact pictures whose errors can be drawn again: .*", skipped[name]
         )
     assert "which pixels show whom" in skipped["moved"]
-    assert not (folder_of(tmp_path / "run", "BL-DC") / results.EXPECTED_FILE).exists()
+    assert not (folder_of(tmp_path / "run", "BL-DC") / EXPECTED_FILE).exists()
 
 
 def _planned(rows, logs, folder, **defaults):
@@ -143,10 +143,8 @@ def test_a_plan_says_which_rows_are_skipped_for_lack_of_a_truth(tmp_path):
 def test_processes_give_the_same_as_this_one(out, logs, tmp_path):
     run([PLAIN[0], TOLD[0]], logs, tmp_path / "run", Processes(2), second_target="expected")
     for name in ("BL-DC", "top"):
-        for file in (results.SUMS_FILE, results.EXPECTED_FILE):
-            one, other = (
-                results.read_sums(folder_of(each, name), "iou", "all", file=file) for each in (out, tmp_path / "run")
-            )
+        for file in (SUMS_FILE, EXPECTED_FILE):
+            one, other = (read_sums(folder_of(each, name), "iou", "all", file=file) for each in (out, tmp_path / "run"))
             np.testing.assert_array_equal(one, other)
 
 
@@ -165,7 +163,7 @@ def test_nothing_is_worked_out_for_rows_that_are_done(out, logs, tmp_path):
     rows, grids = [*PLAIN, *TOLD, SAME, MOVED], tmp_path / "grids"
     run(rows, logs, tmp_path / "run", second_target="expected")
     assert not list(grids.glob("*-truth-*.npz"))
-    (folder_of(tmp_path / "run", "moved") / results.SUMS_FILE).unlink()
+    (folder_of(tmp_path / "run", "moved") / SUMS_FILE).unlink()
     run(rows, logs, tmp_path / "run", second_target="expected")
     assert len(list(grids.glob("*-truth-*.npz"))) == 4, "of two logs, what one row asks and its second target"
 

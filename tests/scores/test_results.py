@@ -8,18 +8,8 @@ from support.windows import random_windows
 
 from semgrid_eval.errors import ResultError
 from semgrid_eval.scores.metrics.table import count_windows
-from semgrid_eval.scores.results import (
-    EXPECTED_FILE,
-    SUMS_FILE,
-    LogRecord,
-    ResultRecord,
-    RunRecord,
-    check_sums,
-    is_done,
-    read_sums,
-    scored_digest,
-    write_sums,
-)
+from semgrid_eval.scores.results import LogRecord, ResultRecord, RunRecord, is_done, scored_digest
+from semgrid_eval.scores.sums import EXPECTED_FILE, SUMS_FILE, check_sums, read_sums, write_sums
 
 
 def counted(**kwargs):

@@ -9,7 +9,8 @@ from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError
 from semgrid_eval.scores.metrics.table import METRICS
 from semgrid_eval.scores.regions.table import PARTITIONS
-from semgrid_eval.scores.results import read_run, read_sums, result_folder
+from semgrid_eval.scores.results import read_run, result_folder
+from semgrid_eval.scores.sums import read_sums
 from semgrid_eval.scores.tidy import load_figures, tidy
 
 

@@ -11,7 +11,7 @@ import pytest
 from support.swept import START_NS, recorded, sweep
 from support.toy_world import png
 
-from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, NO_POINT, class_map
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES, LABEL_ID, NO_POINT
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import LogError
 from semgrid_eval.grids.spec import GridConfig
@@ -57,7 +57,7 @@ def classes(tmp_path, points, images, *, at_ms=0, speed=0.0, yaw_rate=0.0, **set
     write_log(recording, tmp_path / "log.mcap")
     sensor = LidarSensor(colour_from=ColourFrom(**settings))
     with LogReader(tmp_path / "log.mcap") as log:
-        (found,) = read_lidars(log, {"top": sensor}, class_map())
+        (found,) = read_lidars(log, {"top": sensor}, DEFAULT_CLASSES.class_by_label())
     return found.class_id.tolist()
 
 
@@ -154,7 +154,7 @@ def test_several_sweeps_each_find_their_image(tmp_path):
     write_log(recording, tmp_path / "log.mcap")
     with LogReader(tmp_path / "log.mcap") as log:
         sensors = {"top": LidarSensor(colour_from=ColourFrom())}
-        found = [points.class_id.tolist() for points in read_lidars(log, sensors, class_map())]
+        found = [points.class_id.tolist() for points in read_lidars(log, sensors, DEFAULT_CLASSES.class_by_label())]
     assert found == [[CAR], [ROAD], [CAR]]
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.arrays import write_arrays
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import MOVING, STANDING, GridSpec
@@ -14,6 +15,7 @@ from semgrid_eval.report.rows.load import Result, Row
 from semgrid_eval.scores import results
 from semgrid_eval.scores.metrics.metric import ScoredWindows
 from semgrid_eval.scores.metrics.table import count_windows
+from semgrid_eval.scores.sums import write_sums
 from semgrid_eval.seals import open_seal, write_sealed
 
 SIDE = 128
@@ -252,7 +254,7 @@ class _Maker:
             inputs = self._inputs(row)
             windows_id = digest_value([row.what, len(self.records), self.names])
             arrays = {"inputs": inputs, "target": self.target, "mask": self.mask}
-            results.write_arrays(results.windows_file(self.run, windows_id), arrays, owner=windows_id)
+            write_arrays(results.windows_file(self.run, windows_id), arrays, owner=windows_id)
             ids = tuple(self._result(row, seed, inputs, windows_id) for seed in range(max(1, row.seeds)))
         return results.RowRecord(
             facts=row.facts,
@@ -285,9 +287,9 @@ class _Maker:
         result_id = digest_value([row.same_as or row.name, row.wrong, row.config, seed, self.names])
         folder = results.result_folder(self.run, result_id)
         arrays = {"prediction": prediction, "certainty": certainty}
-        results.write_arrays(folder / "predictions.npz", arrays, owner=result_id)
+        write_arrays(folder / "predictions.npz", arrays, owner=result_id)
         scored = ScoredWindows(self.target, prediction, certainty, self.mask, inputs, self.actors, GridSpec())
-        results.write_sums(folder, count_windows(scored))
+        write_sums(folder, count_windows(scored))
         if trained:
             write_sealed(folder / "history.csv", f"{_history(seed, row.wrong)}# {open_seal(result_id)}\n".encode())
         record = results.ResultRecord(

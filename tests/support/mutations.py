@@ -22,6 +22,7 @@ from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.packed import PackedGrids, pack_grids
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores import results
+from semgrid_eval.scores.sums import check_sums
 from semgrid_eval.scores.thumbnails import read_pictures
 from semgrid_eval.seals import read_sealed
 
@@ -33,8 +34,8 @@ ROWS = [
 KINDS: dict[str, tuple[str, Callable[[Path, str], object]]] = {
     "run record": ("run.json", lambda path, _: results.read_run(path.parent)),
     "result": ("results/*/result.json", lambda path, _: results.read_result(path.parent)),
-    "sums": ("results/*/sums.npz", lambda path, _: results.check_sums(path.parent, 2)),
-    "expected": ("results/*/expected.npz", lambda path, _: results.check_sums(path.parent, 2, has_expected=True)),
+    "sums": ("results/*/sums.npz", lambda path, _: check_sums(path.parent, 2)),
+    "expected": ("results/*/expected.npz", lambda path, _: check_sums(path.parent, 2, has_expected=True)),
     "predictions": ("results/*/predictions.npz", lambda path, _: results.read_predictions(path.parent)),
     "history": ("results/*/history.csv", lambda path, _: results.read_history(path.parent)),
     "windows": ("windows/*.npz", lambda path, _: results.read_windows(path.parent.parent, path.stem)),

@@ -17,6 +17,7 @@ from semgrid_eval.errors import ConfigError, ResultError, SemgridError, first_li
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.scores import results as files
+from semgrid_eval.scores.sums import EXPECTED_FILE, check_sums, read_sums
 from semgrid_eval.scores.thumbnails import PICTURES, read_faults
 from semgrid_eval.seals import read_sealed
 
@@ -289,10 +290,10 @@ class _Loader:
     def _result(self, folder: Path) -> Result:
         record = files.read_result(folder)
         windows = self._windows.setdefault(record.windows, record.windows)
-        files.check_sums(folder, len(windows), record.classes, has_expected=record.has_expected)
+        check_sums(folder, len(windows), record.classes, has_expected=record.has_expected)
         shared = record.model_copy(update={"windows": windows})
         expected = None
         if record.has_expected:
-            expected = partial(files.read_sums, folder, classes=record.classes, file=files.EXPECTED_FILE, verify=False)
-        sums = partial(files.read_sums, folder, classes=record.classes, verify=False)
+            expected = partial(read_sums, folder, classes=record.classes, file=EXPECTED_FILE, verify=False)
+        sums = partial(read_sums, folder, classes=record.classes, verify=False)
         return Result(shared, sums, files.read_history(folder), folder, expected)

@@ -11,12 +11,13 @@ from PIL import Image
 from support.fake_run import FakeRow, make_fake_run
 from support.scoring import score_rows
 
-from semgrid_eval.report.examples.drawing import MASKED, POINTLESS
+from semgrid_eval.classes import CLASS_COUNT, DEFAULT_CLASSES
 from semgrid_eval.report.examples.reel import MOST_MOMENTS, make_reel
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.rows.pairing import headline
 from semgrid_eval.scores.results import read_predictions, read_windows
 
+MASKED, POINTLESS = CLASS_COUNT, CLASS_COUNT + 1  # in the legend
 PAIR = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 1))
 LATER = tuple(
     FakeRow(f"PH{at}", family, 0.1, int(family == "ED"), horizon_steps=at + 1)
@@ -31,7 +32,7 @@ def _rows(tmp_path: Path, rows=PAIR, **options):
 
 def _reel(rows):
     scores = score_rows(rows, 0)
-    return make_reel(scores, rows, headline(scores))
+    return make_reel(scores, rows, headline(scores), DEFAULT_CLASSES)
 
 
 def _ids(picture) -> np.ndarray:
@@ -99,4 +100,4 @@ def test_what_is_damaged_is_not_shown(tmp_path, damaged):
 
 def test_without_rows_there_is_nothing_to_play(tmp_path):
     rows = [replace(row, results=()) for row in _rows(tmp_path, recordings=1, windows=1)]
-    assert make_reel({}, rows, None) is None
+    assert make_reel({}, rows, None, DEFAULT_CLASSES) is None

@@ -10,11 +10,13 @@ from PIL import Image
 from support.scoring import score_rows
 from support.streams import stream
 
+from semgrid_eval.arrays import write_arrays
+from semgrid_eval.classes import CLASS_COUNT, DEFAULT_CLASSES
 from semgrid_eval.report.estimates.streams import strategies
-from semgrid_eval.report.examples.drawing import MASKED, POINTLESS
 from semgrid_eval.report.examples.stream_reel import moved, stream_reel
-from semgrid_eval.scores.results import STREAM_FILE, write_arrays
+from semgrid_eval.scores.results import STREAM_FILE
 
+MASKED, POINTLESS = CLASS_COUNT, CLASS_COUNT + 1  # in the legend
 CELL_M = 0.78125
 
 
@@ -62,7 +64,7 @@ def test_answers_are_blank_until_there_is_one_and_then_moved_along(tmp_path):
         _kept(tmp_path / "moved", stream("newest", 60, delay=200.0, measured=True)),
         _kept(tmp_path / "still", stream("still", 50, delay=200.0, measured=True, moved=False)),
     ]
-    reel = stream_reel(strategies(score_rows(rows, 0)))
+    reel = stream_reel(strategies(score_rows(rows, 0)), DEFAULT_CLASSES)
     assert reel.columns == ("Measured", "newest", "still")
     assert reel.moments == ("1 of 3, 0.0 s", "2 of 3, 1.0 s", "3 of 3, 2.0 s")
     measured, along, still = map(_ids, reel.strips[0].pictures)
@@ -73,7 +75,7 @@ def test_answers_are_blank_until_there_is_one_and_then_moved_along(tmp_path):
 
 
 def test_without_what_streams_keep_there_is_nothing_to_play(tmp_path):
-    assert stream_reel([]) is None
+    assert stream_reel([], DEFAULT_CLASSES) is None
     row = stream("newest", 60, delay=200.0, measured=True)
     lost = replace(row, results=(replace(row.results[0], folder=tmp_path),))
-    assert stream_reel(strategies(score_rows([lost], 0))) is None
+    assert stream_reel(strategies(score_rows([lost], 0)), DEFAULT_CLASSES) is None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.towns import small_plans
 
-from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, class_map
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES, LABEL_ID
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.log.check import check_log
@@ -124,7 +124,9 @@ def test_each_camera_sees_the_walls_of_a_room_where_they_are(camera):
     eye = Camera(calibration, 256, 128)
     view = scenery.seen_by(eye)
     disparity = coded_disparity(eye.disparity_px(view.depth_m).reshape(128, 256))
-    pixels = Projection(calibration, (256, 128), class_map()).points(disparity, view.label.reshape(128, 256))
+    pixels = Projection(calibration, (256, 128), DEFAULT_CLASSES.class_by_label()).points(
+        disparity, view.label.reshape(128, 256)
+    )
     is_wall = pixels.class_id == CLASS_NAMES.index("building")
     away_m = np.maximum(np.abs(pixels.forward_m), np.abs(pixels.left_m))
     assert is_wall.sum() > 5000
