@@ -29,7 +29,7 @@ PACKAGE ?= build/package
 PACKAGE_COMMANDS := "convert synthetic logs --recordings 4 --towns 2 --town-size-m 250 --duration-s 15" "check logs" \
   "run smoke --logs logs --out run" "report run" "play run ED-DC --logs logs --out play.mcap"
 
-.PHONY: demo test test-all check docs reference fuzz licences soak package test-lowest test-pythons clean
+.PHONY: demo test test-slow test-all check docs reference fuzz licences soak package test-lowest test-pythons clean
 
 demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo
@@ -38,8 +38,11 @@ reference: $(READY)  ## the paper's table on the simulated town: 15 trainings, t
 	for command in $(REFERENCE_COMMANDS); do $(BIN)/semgrid-eval $$command || exit 1; done
 	$(BIN)/python tools/reference_readme.py $(REFERENCE)/run $(REFERENCE_REPORT) $(REFERENCE_COMMANDS)
 
-test: $(READY)  ## the whole suite
-	$(BIN)/python -m pytest -n auto --dist loadfile
+test: $(READY)  ## the suite, but for what takes more than ten seconds a test
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
+
+test-slow: $(READY)  ## the rest of it: whole chains, kills, clusters, pages run from end to end
+	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
 
 test-all: $(READY)  ## all of it: the suite with a real viewer, the site, the wheel, lowest and other versions, a longer fuzz
 	SEMGRID_VIEWERS=1 $(BIN)/python -m pytest -n auto --dist loadfile -rs

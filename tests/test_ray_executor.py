@@ -146,6 +146,7 @@ def test_a_cluster_that_is_too_small_or_absent_is_one_line(cluster):
         RayExecutor("127.0.0.1:9")
 
 
+@pytest.mark.slow
 def test_ray_gives_the_same_bytes_as_this_process(tmp_path):
     from support.toy_world import street
 

@@ -255,6 +255,7 @@ def test_what_is_added_in_one_file_each_stands_in_a_finished_report(added):
         assert text in page
 
 
+@pytest.mark.slow
 def test_a_network_of_ones_own_is_trained_with_its_own_loss(added):
     (added / "m.yaml").write_text(yaml.safe_dump(MATRIX))
     command("convert", "lane", "logs", "--workers", 1)

@@ -31,6 +31,7 @@ def tiny(monkeypatch):
     monkeypatch.setattr(measurement, "QUICK", TINY)
 
 
+@pytest.mark.slow
 def test_every_part_is_measured_printed_and_written(tiny, tmp_path):
     done = CliRunner().invoke(cli, ["bench", "--quick", "--json", str(tmp_path / "bench.json")])
     assert done.exit_code == 0, done.output

@@ -61,6 +61,7 @@ def published(out):
     return " ".join(fingerprint(out / f"{label}.mcap")[:8] for label in LABELS)
 
 
+@pytest.mark.slow
 def test_the_example_writes_logs_and_a_second_run_keeps_them_and_warns_of_others(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _, *arguments = shlex.split(load_source("synthetic").example)

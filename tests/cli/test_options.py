@@ -51,6 +51,7 @@ def test_workers_say_how_many_processes_there_are():
     assert several.parallel == 3
 
 
+@pytest.mark.slow
 def test_convert_grids_and_run_do_on_ray_what_they_do_here(here):
     for where, options in (("here", ()), ("ray", ("--executor", "ray"))):
         call("convert", "cityscapes", "cityscapes", f"{where}/logs", "--labels", "labels", *options)

@@ -102,6 +102,7 @@ def test_a_gate_that_fails_is_exit_code_1_with_a_line_for_each_limit_and_the_pag
     assert [line.startswith("Error: gate: ED-DC, mean_known: -0.") for line in lines] == [False, False, True, False]
 
 
+@pytest.mark.slow
 def test_a_gate_that_holds_is_exit_code_0(before_and_after, tmp_path, capsys):
     held = ("--fail-below", "mean_known: -0.01", "--out", tmp_path / "page")
     assert _run(capsys, "report", *reversed(before_and_after), *held)[0] == 0

@@ -71,6 +71,7 @@ def test_example_of_grids_runs_and_a_second_time_finds_all(here):
     assert "0 logs built, 2 re-used" in call(*example_of("grids")).stderr
 
 
+@pytest.mark.slow
 def test_dry_run_tells_updates_and_minutes_and_trains_nothing(here):
     rows = [{"name": "BL-DC", "model": "newest"}, {"name": "ED-DC", "model": "ed"}, {"name": "ED-SL2", "model": "ed"}]
     arguments = ["run", matrix(here, rows), "--logs", "logs", "--out", "run"]

@@ -56,12 +56,14 @@ def toy_logs(folder):
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+@pytest.mark.slow
 def test_tour(workplace, page):
     run(page)
     assert Path("runs/first/report/index.html").is_file()
     assert Path("play.mcap").is_file() == (page == "docs/index.md")
 
 
+@pytest.mark.slow
 def test_own_data(workplace):
     for frame in Tree(Path("SRC"), size=(128, 64)).write(range(30)):
         Path("PREDICTIONS").mkdir(exist_ok=True)
@@ -73,6 +75,7 @@ def test_own_data(workplace):
     assert len(list(Path("labelled").rglob("*.mcap"))) == 1
 
 
+@pytest.mark.slow
 def test_own_model(workplace):
     import torch
 
@@ -87,6 +90,7 @@ def test_own_model(workplace):
     assert len(list(Path("runs/small/results").iterdir())) == 3
 
 
+@pytest.mark.slow
 def test_report_and_playback(workplace):
     toy_logs("logs")
     assert run_command(["run", "baselines", "--logs", "logs", "--out", "runs/first"]).code == 0
@@ -103,6 +107,7 @@ def test_check(workplace):
     run("docs/check.md")
 
 
+@pytest.mark.slow
 def test_latency_and_streaming(workplace):
     run("docs/streaming.md")
     Path("drives").rename("logs")

@@ -4,6 +4,7 @@ import json
 
 import matplotlib
 import matplotlib.pyplot as plt
+import pytest
 from support.pages import text_of
 
 SMALLER = (
@@ -12,6 +13,7 @@ SMALLER = (
 )
 
 
+@pytest.mark.slow
 def test_the_notebook_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     matplotlib.use("agg")

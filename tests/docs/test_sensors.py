@@ -19,6 +19,7 @@ PAGE = text_of("docs/sensors.md")
 CONVERT, CHECK, _, RUN, REPORT = (line for line in commands(PAGE) if line.startswith("semgrid-eval "))
 
 
+@pytest.mark.slow
 def test_commands_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     small = ["--width", "64", "--height", "32", "--workers", "1", "--cache", str(town_cache())]

@@ -49,6 +49,7 @@ class StopAfter:
 
 
 @pytest.mark.parametrize("precision", ["float32", "bf16"])
+@pytest.mark.slow
 def test_network_learns_a_car_that_drives_right(tmp_path, precision):
     windows = windows_of(0, 1, 2, 3)
     training = {"epochs": 6, "updates_per_epoch": 50, "batch": 8, "schedule": {"drop_epoch": 4}, "precision": precision}

@@ -100,6 +100,7 @@ def test_an_own_network_is_trained_like_a_built_in_one(logs, tmp_path, small):
     assert before == {path: path.stat().st_mtime_ns for path in before}
 
 
+@pytest.mark.slow
 def test_an_own_network_ends_in_the_same_bytes_after_a_stop_and_in_other_processes(logs, tmp_path, small, monkeypatch):
     def outputs(out):
         files = [*out.glob("results/*/sums.npz"), *out.glob("trainings/*/weights.safetensors")]
@@ -253,6 +254,7 @@ class Backward(Wrong):
 """
 
 
+@pytest.mark.slow
 def test_an_own_model_without_room_is_tried_again_alone(logs, tmp_path):
     (tmp_path / "faulty.py").write_text(FAULTY)
     rows = [{"name": "own", "model": f"{tmp_path}/faulty.py:Greedy"}, {"name": "BL-DC", "model": "newest"}]

@@ -128,6 +128,7 @@ ENDS = {
 }
 
 
+@pytest.mark.slow
 def test_whatever_ends_a_process_apart_is_the_reason_of_its_row_alone(logs, tmp_path):
     rows = rows_of(tmp_path, RUDE, *ENDS)
     record = run(rows, logs, tmp_path / "run")
@@ -138,6 +139,7 @@ def test_whatever_ends_a_process_apart_is_the_reason_of_its_row_alone(logs, tmp_
     assert record.rows[-1].failure is None
 
 
+@pytest.mark.slow
 def test_what_hangs_is_ended_after_the_limit_and_the_rest_goes_on(logs, tmp_path):
     rows = rows_of(tmp_path, RUDE, "Hangs")
     with own_models(Limits(time_s=10)):
@@ -166,6 +168,7 @@ def test_a_file_that_ends_its_process_is_told_of_once_for_all_its_rows(logs, tmp
     assert run(rows[:1], logs, tmp_path / "run").rows[0].failure is None  # what was mended is loaded
 
 
+@pytest.mark.slow
 def test_numbers_are_the_same_apart_here_and_in_several_processes(logs, tmp_path):
     rows = [{**row, "repeats": 2} if row["name"] == "Chance" else row for row in rows_of(tmp_path, CHANCE, "Chance")]
     threads = torch.get_num_threads()

@@ -37,6 +37,7 @@ def folders(tmp_path_factory):
     return logs, folder / "packed"
 
 
+@pytest.mark.slow
 def test_a_run_on_packed_grids_is_the_run_on_logs(folders, tmp_path):
     logs, packed = folders
     from_logs, from_grids = run(ROWS, logs, tmp_path / "a"), run(ROWS, packed, tmp_path / "b")

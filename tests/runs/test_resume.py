@@ -1,6 +1,7 @@
 import multiprocessing
 
 import numpy as np
+import pytest
 from support.killable import run_here
 from support.toy_world import street
 
@@ -29,6 +30,7 @@ def outputs(out):
     return {str(path.relative_to(out)): path.read_bytes() for path in files}
 
 
+@pytest.mark.slow
 def test_runs_killed_at_random_moments_end_with_the_same_bytes(tmp_path):
     for i, split in enumerate(("train", "train", "val")):
         write_log(street(i, frames=9).recording(f"toy{i}", split), tmp_path / "logs" / f"toy{i}.mcap")

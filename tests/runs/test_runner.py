@@ -184,6 +184,7 @@ def test_predictions_of_a_perfect_past_are_certain(logs, tmp_path):
     assert (np.asarray(certainty) == 255).all()
 
 
+@pytest.mark.slow
 def test_several_processes_give_the_same_bytes_as_one(logs, tmp_path):
     rows = [
         {"name": "BL-DC", "model": "newest"},

@@ -51,6 +51,7 @@ def failures(record):
     return {row.name: row.failure for row in record.rows}
 
 
+@pytest.mark.slow
 def test_rows_that_processes_have_trained_are_known_when_others_are_asked_for(work):
     trained = work([BL, ED], Processes(2))
     again = work([BL, ED], Processes(2), only=("BL",))

@@ -58,6 +58,7 @@ def figures(out, part):
     return json.loads((out / f"{part}.json").read_text())
 
 
+@pytest.mark.slow
 def test_rates_then_rows_are_measured_scored_and_priced(carried, tmp_path):
     earlier = tmp_path / "out-work" / "run" / "trainings" / "0"
     earlier.mkdir(parents=True)
