@@ -263,5 +263,6 @@ DEFAULT_FILE = resources.files("semgrid_eval").joinpath("data/classes.yaml")
 
 with resources.as_file(DEFAULT_FILE) as _path:
     DEFAULT_CLASSES = load_classes(_path)
-CLASS_NAMES, CLASS_COUNT = DEFAULT_CLASSES.names, DEFAULT_CLASSES.count
+CLASS_NAMES = DEFAULT_CLASSES.names
+CLASS_COUNT = DEFAULT_CLASSES.count
 """Of the default set: for the paper's tables and for whoever has no other."""
