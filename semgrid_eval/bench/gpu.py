@@ -13,12 +13,11 @@ import torch
 from torch import Tensor
 
 from semgrid_eval.bench.measurement import Measurement
-from semgrid_eval.bench.networks import GIVEN, Subject, flops_of_an_update, random_windows
+from semgrid_eval.bench.networks import encoder_decoder, flops_of_an_update, random_windows
 from semgrid_eval.errors import first_line
 from semgrid_eval.executors import Processes, WorkerDied
 from semgrid_eval.models.device import settle_process, visible_gpus
-from semgrid_eval.models.encoder_decoder import EncoderDecoder, EncoderDecoderSettings
-from semgrid_eval.models.network import Network, TrainingConfig, autocast, seeded_network
+from semgrid_eval.models.network import Network, autocast
 from semgrid_eval.models.training import train
 
 SHARE_GOAL = 35.0
@@ -86,7 +85,7 @@ def measure_gpu(size: Size, device: torch.device) -> Iterator[Measurement | str]
     rate = product_rate(size, device)
     yield Measurement(f"product of bf16 matrices, {size.matrix_rows} rows", rate / 1e12, "Tflop/s")
     yield Measurement("trained by the package", package_rate(size, device), "windows/s")
-    seconds_at_best = flops_of_an_update(Subject("ED", _settings(size)), 1) / rate
+    seconds_at_best = flops_of_an_update(encoder_decoder(size.features), 1) / rate
     graphs = device.type == "cuda"
     first, later = ([way for way in ways if graphs or not (way.graph or way.compiled)] for ways in (WAYS, LATER_WAYS))
     answers = [way for way in ANSWERS if graphs or not way.graph]
@@ -114,8 +113,8 @@ def product_rate(size: Size, device: torch.device) -> float:
 
 def package_rate(size: Size, device: torch.device) -> float:
     """Return the windows a second of the package's own training."""
-    training = TrainingConfig(epochs=4, updates_per_epoch=size.updates, batch=size.batch, precision="bf16")
-    network = seeded_network(EncoderDecoder, _settings(size, training), GIVEN, seed=0)
+    training = {"epochs": 4, "updates_per_epoch": size.updates, "batch": size.batch, "precision": "bf16"}
+    network = encoder_decoder(size.features).network(**training)
     with tempfile.TemporaryDirectory() as folder:
         trained = train(network, random_windows(), seed=0, device=device, folder=Path(folder))
     return size.updates * size.batch / median(max(row.seconds, 1e-3) for row in trained.history[1:])
@@ -198,14 +197,10 @@ def train_between(item: tuple[Size, str, float, float]) -> float:
 
 
 def _network(way: Way, size: Size, device: torch.device) -> Network:
-    network = seeded_network(EncoderDecoder, _settings(size), GIVEN, seed=0).to(device)
+    network = encoder_decoder(size.features).network().to(device)
     memory_format = torch.channels_last if way.channels_last else torch.contiguous_format
     network.to(memory_format=memory_format)  # type: ignore[call-overload] # torch's stubs lack this form
     return network
-
-
-def _settings(size: Size, training: TrainingConfig | None = None) -> EncoderDecoderSettings:
-    return EncoderDecoderSettings(features=size.features, training=training or TrainingConfig())
 
 
 def _ready(work: Callable[[], object], *, graph: bool) -> Callable[[], object]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -181,23 +182,30 @@ class _Stretch:
 
 def _build_and_keep(log: Path, folder: Path, config: GridConfig) -> str | None:
     try:
-        file, key = _cache_file(log, folder, config)
-        write_recordings(file, build_log(log, config), owner=key)
+        kept = _kept(log, folder, config)
+        write_recordings(kept.file, build_log(log, config), owner=kept.key)
     except SemgridError as error:
         return _about(log, error)
     return None
 
 
 def _read(log: Path, folder: Path, config: GridConfig) -> list[GridRecording]:
-    file, key = _cache_file(log, folder, config)
-    return read_recordings(file, log, owner=key)
+    kept = _kept(log, folder, config)
+    return read_recordings(kept.file, log, owner=kept.key, recovered=kept.recovered)
 
 
-def _cache_file(log: Path, folder: Path, config: GridConfig) -> tuple[Path, str]:
-    """Return where the grids of a log are kept, and the digest by which they are sealed."""
+class _Kept(NamedTuple):
+    """Where the grids of a log are kept, the digest by which they are sealed, and what the log lost."""
+
+    file: Path
+    key: str
+    recovered: str
+
+
+def _kept(log: Path, folder: Path, config: GridConfig) -> _Kept:
     with LogReader(log) as reader:
         key = grid_key(reader.digest, config)
-    return folder / grid_file(log.stem, key), key
+        return _Kept(folder / grid_file(log.stem, key), key, str(reader.recovered() or ""))
 
 
 def grid_key(log_digest: str, config: GridConfig) -> str:

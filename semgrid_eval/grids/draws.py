@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import UnknownTruthError
 from semgrid_eval.geometry import SE2
-from semgrid_eval.grids.rasterise import grid_of, no_points
+from semgrid_eval.grids.rasterise import grid_of
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import FrameLog, WindowTimes, plain_png
 from semgrid_eval.log.reader import LogReader
@@ -52,7 +52,7 @@ class Draws:
         redrawing = redrawing_of(log, camera)
         exact = _ExactPictures(log, camera)
         motion = EgoMotion(log.motion(), config.integrator)
-        found = np.zeros((len(times.target_ns), *no_points(config).shape), np.uint8)
+        found = np.zeros((len(times.target_ns), *config.layers_shape), np.uint8)
         newest_ns = times.inputs_ns[:, -1] if self.continued else times.target_ns
         for window in np.argsort(newest_ns, kind="stable"):  # the errors go on from one newest input to the next
             target_ns = int(times.target_ns[window])
@@ -111,7 +111,7 @@ def _votes(log: LogReader, config: GridConfig, drawn: Iterable[Pictures], place:
         for draw, each in enumerate(drawn)
     ]
     by_draw = defaultdict[int, list[Points]](list)
-    votes = no_points(config).astype(np.uint8)
+    votes = np.zeros(config.layers_shape, np.uint8)
     with FrameLog(log.path, frames) as shown:
         for points in read_points(
             shown, {name: config.sensors[name] for name in config.target}, config.class_by_label()

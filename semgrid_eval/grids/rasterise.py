@@ -19,7 +19,7 @@ Counts = NDArray[np.int32]
 
 def no_points(config: GridConfig) -> Counts:
     """Return counts (C, rows, columns) of no point, to add some to."""
-    return np.zeros((config.classes.count, config.spec.rows, config.spec.columns), np.int32)
+    return np.zeros(config.layers_shape, np.int32)
 
 
 def add_points(counts: Counts, points: Points, grid_from_points: SE2, spec: GridSpec) -> None:

@@ -35,6 +35,7 @@ class GridRecording:
     actors: NDArray[np.uint8] | None = None
     group: str = ""  # the town, city or drive that the log belongs to; empty where it does not say
     has_checksums: bool = True  # whether the log has them, so that damage can be seen
+    recovered: str = ""  # of a log that was recovered from a damaged one, what it lost; the log says it, not the grids
 
 
 def write_recordings(path: Path, recordings: Sequence[GridRecording], *, owner: str) -> None:
@@ -55,8 +56,8 @@ def write_recordings(path: Path, recordings: Sequence[GridRecording], *, owner: 
     write_arrays(path, arrays, owner=owner)
 
 
-def read_recordings(path: Path, log: Path, *, owner: str) -> list[GridRecording]:
-    """Read the grids of a log's stretches in one pass.
+def read_recordings(path: Path, log: Path, *, owner: str, recovered: str = "") -> list[GridRecording]:
+    """Read the grids of a log's stretches in one pass; `recovered` is what the log lost.
 
     Raises:
         ResultError: the file is missing, damaged, lacks an array or belongs to another `owner`.
@@ -78,6 +79,7 @@ def read_recordings(path: Path, log: Path, *, owner: str) -> list[GridRecording]
             split=split,
             dataset=dataset,
             group=group,
+            recovered=recovered,
             has_checksums=bool(arrays["has_checksums"][0]),
             sensors=tuple(str(sensor) for sensor in arrays["sensors"]),
             target=target,

@@ -108,6 +108,11 @@ class GridConfig(Config):
         """What is done to the cells of a sensor: its own choice, or the grid's."""
         return self.sensors[sensor].morphology or self.morphology
 
+    @property
+    def layers_shape(self) -> tuple[int, int, int]:
+        """Of what is counted for each class in each cell: (C, rows, columns)."""
+        return self.classes.count, self.spec.rows, self.spec.columns
+
     def target_identity(self) -> dict[str, object]:
         """Return what determines the targets alone, whatever other sensors there are and what any is called."""
         settings = self.model_dump(mode="json")

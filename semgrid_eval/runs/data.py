@@ -13,7 +13,6 @@ from semgrid_eval.files import digest_value
 from semgrid_eval.grids.build import GridDataSet, build_grids
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.fingerprint import kept_fingerprints
-from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.row import Row
@@ -132,7 +131,7 @@ class RunData:
                     dataset=recording.dataset,
                     group=recording.group,
                     checksums=recording.has_checksums,
-                    recovered=_recovery(Path(recording.log)),
+                    recovered=recording.recovered,
                 )
         return self._sets[key]
 
@@ -144,12 +143,6 @@ class RunData:
             return f"none of the logs ({len(self._logs)}) gave grids; the first fails by: {first}"
         found = ", ".join(sorted({record.split for record in self.records.values()}))
         return f"no recording of split {split!r} gave grids (splits found: {found})"
-
-
-def _recovery(log: Path) -> str:
-    """Say what a log lost that was recovered from a damaged one; empty for others."""
-    with LogReader(log) as reader:
-        return str(reader.recovered() or "")
 
 
 def grid_digest(config: GridConfig) -> str:

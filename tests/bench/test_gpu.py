@@ -25,7 +25,7 @@ def test_what_fails_is_told_and_the_rest_is_measured(monkeypatch):
     assert all(each.value > 0 for each in rates.values())
     assert {"trained by the package", "trained, eager", "trained, channels first", "trained, float32"} <= rates.keys()
     share = rates["trained, eager, of the product of matrices"]
-    flops = gpu.flops_of_an_update(gpu.Subject("ED", gpu._settings(gpu.SMOKE)), 1)
+    flops = gpu.flops_of_an_update(gpu.encoder_decoder(gpu.SMOKE.features), 1)
     best = rates["product of bf16 matrices, 64 rows"].value * 1e12 / flops
     assert share.value == pytest.approx(100 * rates["trained, eager"].value / best)
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.poles import POLE, Poles
 from support.swept import START_NS, TURNED, Drive, recorded, scanned, seen, sweep
-from support.toy_world import FRAME_NS, Box, Mount, ToyWorld
+from support.toy_world import FRAME_NS, Mount, ToyWorld
 
 from semgrid_eval.classes import CLASS_NAMES, UNKNOWN
 from semgrid_eval.config import parse_config
@@ -20,28 +21,17 @@ from semgrid_eval.recording.types import Moment, MotionSample
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sensors.lidar import LidarSensor
 
-POLE, CAR = CLASS_NAMES.index("pole_sign"), CLASS_NAMES.index("car")
+CAR = CLASS_NAMES.index("car")
 SPEC = GridSpec(rows=400, columns=400, cell_m=0.1, agent_row=300, agent_column=250)
 LIDAR_NS, LATE_NS = 100_000_000, 30_000_000  # 10 Hz, and how much later the camera begins, at 17 Hz
 PLACES = [(x + 0.15, 9.15) for x in range(2, 30, 3)]
-POLES = [Box("pole", x - 0.15, x + 0.15, y - 0.15, y + 0.15, 3.0) for x, y in PLACES]
+POLES = Poles(PLACES, SPEC)
 
 
 def built(recording, folder, **settings):
     write_log(recording, folder / "log.mcap")
     (grids,) = build_log(folder / "log.mcap", GridConfig(spec=SPEC, integrator="arc", **settings))
     return grids
-
-
-def pole_places_m(grid):
-    cells = np.argwhere(grid == POLE)
-    return (np.array([SPEC.agent_row, SPEC.agent_column]) - 0.5 - cells) * SPEC.cell_m
-
-
-def away_m(places_m, pose):
-    """How far from the nearest pole of the world cells are, seen from a pose, in the axes of the world."""
-    found = np.add(places_m, pose[:2])
-    return np.hypot(*(found[:, None] - np.array(PLACES)[None]).transpose(2, 0, 1)).min(axis=1)
 
 
 def test_points_stand_where_they_are_whatever_the_lidars_place_and_turn(tmp_path):
@@ -53,15 +43,17 @@ def test_points_stand_where_they_are_whatever_the_lidars_place_and_turn(tmp_path
         target=("top",),
     )
     for frame in range(10):
-        places_m = pole_places_m(grids.grids[0, frame])
+        places_m = POLES.found_m(grids.grids[0, frame])
         assert len(places_m) >= 5
-        assert away_m(places_m, drive.pose_at(frame * LIDAR_NS)).max() <= 0.05 * math.sqrt(2) + 1e-3
+        assert POLES.away_m(places_m, drive.pose_at(frame * LIDAR_NS)).max() <= 0.05 * math.sqrt(2) + 1e-3
 
 
 def fused(drive):
     """A LiDAR at 10 Hz, a camera at 17 Hz that is 30 ms late, and motion at 50 Hz."""
     cameras = {"front": Mount(yaw_rad=0.5, late_ns=LATE_NS)}
-    world = ToyWorld(POLES, speed_mps=drive.speed_mps, yaw_rate_radps=drive.yaw_rate_radps, frames=16, cameras=cameras)
+    world = ToyWorld(
+        POLES.boxes, speed_mps=drive.speed_mps, yaw_rate_radps=drive.yaw_rate_radps, frames=16, cameras=cameras
+    )
 
     def moments():
         pictures = (replace(moment, motion=()) for moment in world.recording().moments())
@@ -91,9 +83,9 @@ def test_a_camera_at_17_hz_30_ms_late_stands_in_the_grids_of_a_lidar_at_10_hz(tm
     for frame in range(1, 10):
         pose = drive.pose_at(frame * LIDAR_NS)
         for row, reach_m in ((0, 0.05 * math.sqrt(2) + 1e-3), (1, 0.15 * math.sqrt(2) + 0.15)):
-            places_m = pole_places_m(grids.grids[row, frame])
+            places_m = POLES.found_m(grids.grids[row, frame])
             found += len(places_m)
-            assert (away_m(places_m, pose) < reach_m).all()
+            assert (POLES.away_m(places_m, pose) < reach_m).all()
     assert found > 150
 
 
@@ -105,9 +97,9 @@ def test_a_lidar_stands_in_the_grids_of_a_camera_as_old_as_its_newest_sweep_is(t
     start_rad = drive.pose_at(LATE_NS)[2]
     for frame, since_ns in enumerate(times_ns.tolist()):
         x_m, y_m, _ = drive.pose_at(since_ns)
-        places_m = pole_places_m(grids.grids[0, frame])
+        places_m = POLES.found_m(grids.grids[0, frame])
         turn = np.array([[math.cos(start_rad), math.sin(start_rad)], [-math.sin(start_rad), math.cos(start_rad)]])
-        assert (away_m(places_m @ turn, (x_m, y_m)) < 0.05 * math.sqrt(2) + 1e-2).all()
+        assert (POLES.away_m(places_m @ turn, (x_m, y_m)) < 0.05 * math.sqrt(2) + 1e-2).all()
     ages_ms = (times_ns % LIDAR_NS) / 1e6
     limit_s = float(np.median(ages_ms)) * 1e-3
     young = built(fused(drive), tmp_path, sensors={**SENSORS, "top": LidarSensor(max_age_s=limit_s)}, target=("front",))

@@ -97,6 +97,12 @@ class _Kept:
         return None if place is None else {name: array[place] for name, array in arrays.items()}
 
 
+def moments_since(stamps_ns: Sequence[int]) -> tuple[str, ...]:
+    """Name moments that follow each other by how many there are and the time since the first."""
+    count, first_ns = len(stamps_ns), stamps_ns[0]
+    return tuple(f"{number} of {count}, {(ns - first_ns) / 1e9:.1f} s" for number, ns in enumerate(stamps_ns, start=1))
+
+
 def _behind(front: Grid, back: Grid) -> Grid:
     return np.where(front == UNKNOWN, back, front)
 
@@ -141,8 +147,7 @@ def _over_time(contest: Contest, kept: _Kept) -> _Plan | None:
         return lambda window: [give(row, each) for each in around(window)]
 
     model, rivals = contest.model, contest.rivals[:_MOST_RIVALS]
-    first, *later = (window.target_stamp_ns for window in around(picked[0]))
-    since = [f"{number} of {count}, {(ns - first) / 1e9:.1f} s" for number, ns in enumerate((first, *later), start=1)]
+    since = moments_since([window.target_stamp_ns for window in around(picked[0])])
     hint = "Windows that follow each other: the newest input, the target, and what rows predicted."
     columns = [("Newest input", over(kept.seen, model)), ("Target", over(kept.target, model))]
     columns += [(row.name, over(kept.answer, row)) for row in (model, *rivals)]

@@ -11,7 +11,7 @@ from semgrid_eval.errors import SemgridError
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.report.estimates.streams import Strategy, facts_of, plain_strategy
 from semgrid_eval.report.examples.drawing import Frame, Grid, strip_picture
-from semgrid_eval.report.examples.reel import MOST_MOMENTS, Reel, Strip
+from semgrid_eval.report.examples.reel import MOST_MOMENTS, Reel, Strip, moments_since
 from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.rows.pairing import HEADLINE
 from semgrid_eval.scores.results import read_stream
@@ -35,7 +35,6 @@ def stream_reel(found: Sequence[Strategy], classes: ClassSet) -> Reel | None:
     first = kept[0][1]
     start = max(0, len(first["evaluated_ns"]) - MOST_MOMENTS) // 2
     moments = range(start, min(start + MOST_MOMENTS, len(first["evaluated_ns"])))
-    since_s = [(first["evaluated_ns"][at] - first["evaluated_ns"][start]) / 1e9 for at in moments]
     measured = [Frame(first["target"][at], first["mask"][at] > 0) for at in moments]
     columns: list[tuple[str, Sequence[Frame | None]]] = [("Measured", measured)]
     columns += [(row.name, _answers(row, arrays, moments)) for row, arrays in kept]
@@ -44,7 +43,7 @@ def stream_reel(found: Sequence[Strategy], classes: ClassSet) -> Reel | None:
         "A recording, time by time",
         _HINT,
         tuple(name for name, _ in columns),
-        tuple(f"{number} of {len(moments)}, {since:.1f} s" for number, since in enumerate(since_s, start=1)),
+        moments_since([int(first["evaluated_ns"][at]) for at in moments]),
         (Strip(recording, tuple(strip_picture(name, frames, classes) for name, frames in columns)),),
     )
 

@@ -34,12 +34,12 @@ def metrics_of(classes: ClassSet) -> dict[str, Metric]:
 
 def count_windows(scored: ScoredWindows) -> dict[tuple[str, str], NDArray[np.int32]]:
     """Count every metric by every partition of the cells that the windows tell."""
-    found = {}
+    found, metrics = {}, metrics_of(scored.classes).values()
     for partition in PARTITIONS.values():
         number = partition.number(scored)
         if number is None:
             continue
         regions = Regions(np.where(scored.left_out, -1, number), len(partition.regions))
-        for metric in metrics_of(scored.classes).values():
+        for metric in metrics:
             found[metric.name, partition.name] = metric.count(scored, regions).astype(np.int32)
     return found

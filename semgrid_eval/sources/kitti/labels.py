@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import InputError
 
+CLASS_BITS = 0xFFFF
+"""Of a label; the others number instances."""
 CLASSES: dict[int, tuple[str, str]] = {
     0: ("unlabeled", "unlabeled"),
     1: ("outlier", "unlabeled"),

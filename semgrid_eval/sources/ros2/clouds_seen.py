@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from semgrid_eval.sources.kitti.labels import CLASSES
+from semgrid_eval.sources.kitti.labels import CLASS_BITS, CLASSES
 from semgrid_eval.sources.ros2.clouds import NUMBERS, WHOLE, columns_of, type_of
+from semgrid_eval.sources.ros2.labels import likely_ids
 from semgrid_eval.sources.ros2.lidars import LONGEST_NS, NS_BY_UNIT
 from semgrid_eval.sources.ros2.mapping import LidarMap, PointTimes
 
@@ -15,7 +16,7 @@ _TIME_NAMES = ("t", "time", "timestamp", "time_stamp", "time_offset", "offset_ti
 _LABEL_NAMES = ("label", "labels", "label_id", "class", "class_id", "semantic", "objtag")
 _EPOCH_S = 1e8
 """No offset is so long, and no clock since 1970 shows less."""
-_LAST_TRAIN_ID, _LAST_LABEL_ID = 18, 33
+_LAST_LABEL_ID = 33
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,6 @@ def _times(field: str, values: Any) -> PointTimes | None:  # noqa: ANN401 - an a
 
 def _ids(ids: Any) -> str:  # noqa: ANN401 - an array (N,) of whole numbers
     highest = int(ids.max(initial=0))
-    if highest <= _LAST_TRAIN_ID:
-        return "train_ids"
-    if highest > _LAST_LABEL_ID and np.isin(ids & 0xFFFF, list(CLASSES)).all():
+    if highest > _LAST_LABEL_ID and np.isin(ids & CLASS_BITS, list(CLASSES)).all():
         return "semantickitti"
-    return "label_ids"
+    return likely_ids(highest)

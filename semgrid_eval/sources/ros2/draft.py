@@ -5,13 +5,13 @@ from collections.abc import Iterator
 from semgrid_eval.errors import InputError
 from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.contents import Contents, Seen
-from semgrid_eval.sources.ros2.draft_lidars import draft_lidars
+from semgrid_eval.sources.ros2.draft_lidars import draft_lidars, place_lines
+from semgrid_eval.sources.ros2.labels import likely_ids
 from semgrid_eval.sources.ros2.pictures import require_coding
 
 _LABEL_WORDS = ("label", "segment", "semantic", "/seg", "_seg")
 _RIGHT_WORDS = ("right", "infra2", "cam1")
 _DEPTH_WORDS = ("depth",)
-_LAST_TRAIN_ID = 18
 _VEHICLE_FRAMES = ("base_link", "base_footprint", "ego_vehicle", "vehicle")
 _VIRTUAL_BASELINE_M = 0.5
 
@@ -68,11 +68,7 @@ def _camera(contents: Contents, vehicle: str) -> Iterator[str]:
     yield from found.depth_lines()
     yield from found.label_lines()
     frame = contents.topics[found.image or found.depth or found.disparity].frame if found.any else ""
-    if contents.transforms.has(vehicle, frame):
-        yield f"    # extrinsics: from tf, {vehicle} to {frame}"
-    else:
-        yield f"    # Nothing in the bag links {vehicle} to {frame or 'the camera'}: measure where the camera sits."
-        yield "    extrinsics: {x_m: , y_m: , z_m: , roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0}"
+    yield from place_lines(contents, vehicle, frame or "the camera", "the camera")
 
 
 class _Pictures:
@@ -123,7 +119,7 @@ class _Pictures:
             yield "    # no labels: `semgrid-eval segment` adds them to the logs"
             return
         highest = self._contents.topics[self.labels].highest_id
-        ids = "train_ids" if highest is not None and highest <= _LAST_TRAIN_ID else "label_ids"
+        ids = "label_ids" if highest is None else likely_ids(highest)
         yield f"    labels: {self.labels}"
         yield f"    ids: {ids}  # the first image holds ids up to {highest}; or names: {{road: [0], car: [13, 14]}}"
 

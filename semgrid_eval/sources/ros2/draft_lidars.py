@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 
 from semgrid_eval.sources.ros2.clouds_seen import CloudSeen
-from semgrid_eval.sources.ros2.contents import Contents, Seen
+from semgrid_eval.sources.ros2.contents import Contents
 
 _ONLY = "top"
 _GENERIC = {"points", "points_raw", "point_cloud", "pointcloud", "cloud", "packets", "lidar", "sensing"}
@@ -22,7 +22,7 @@ def draft_lidars(contents: Contents, vehicle: str) -> Iterator[str]:
         yield f"  {name}:"
         yield f"    cloud: {topic}"
         yield from _fields(seen.cloud)
-        yield from _place(contents, seen, vehicle)
+        yield from place_lines(contents, vehicle, seen.frame or "the LiDAR", "it")
     for topic in sorted(clouds.keys() - swept.keys()):
         yield f"# {topic} has the frame of a camera, as points made of its pictures have: left out."
 
@@ -49,9 +49,10 @@ def _fields(cloud: CloudSeen) -> Iterator[str]:
         yield f"    ids: {cloud.ids}  # the first cloud holds ids up to {cloud.highest_id}; or names: {{road: [40]}}"
 
 
-def _place(contents: Contents, seen: Seen, vehicle: str) -> Iterator[str]:
-    if seen.frame == vehicle or contents.transforms.has(vehicle, seen.frame):
-        yield f"    # extrinsics: from tf, {vehicle} to {seen.frame}"
+def place_lines(contents: Contents, vehicle: str, frame: str, sensor: str) -> Iterator[str]:
+    """Say where a sensor sits: nothing where tf tells it, else what has to be measured."""
+    if contents.transforms.has(vehicle, frame):
+        yield f"    # extrinsics: from tf, {vehicle} to {frame}"
     else:
-        yield f"    # Nothing in the bag links {vehicle} to {seen.frame or 'the LiDAR'}: measure where it sits."
+        yield f"    # Nothing in the bag links {vehicle} to {frame}: measure where {sensor} sits."
         yield "    extrinsics: {x_m: , y_m: , z_m: , roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0}"

@@ -8,7 +8,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.sources.kitti.labels import CLASSES
 from semgrid_eval.sources.ros2.mapping import HIGHEST_PIXEL, Ids
 
-_NO_TRAIN_ID = 255
+_LAST_TRAIN_ID, _NO_TRAIN_ID = 18, 255
 
 
 class LabelTable:
@@ -33,6 +33,11 @@ class LabelTable:
             raise _unknown(int(ids[~known].min()))
         found: NDArray[np.uint8] = self._table[ids]
         return found
+
+
+def likely_ids(highest: int) -> str:
+    """Guess by the highest of some ids which of Cityscapes' kinds they are."""
+    return "train_ids" if highest <= _LAST_TRAIN_ID else "label_ids"
 
 
 def _unknown(label: int) -> InputError:

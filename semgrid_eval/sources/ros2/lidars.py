@@ -11,6 +11,7 @@ from semgrid_eval.geometry import SE3
 from semgrid_eval.motion import EgoMotion
 from semgrid_eval.recording.lidar import LidarSweep, Mount
 from semgrid_eval.sources.deskewing import deskewed
+from semgrid_eval.sources.kitti.labels import CLASS_BITS
 from semgrid_eval.sources.ros2.clouds import INTENSITY, PLACE, columns_of
 from semgrid_eval.sources.ros2.labels import LabelTable
 from semgrid_eval.sources.ros2.mapping import HIGHEST_POINT, LidarMap, PointTimes, VehicleMap
@@ -19,7 +20,6 @@ from semgrid_eval.sources.ros2.scan import Facts
 NS_BY_UNIT = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}
 LONGEST_NS = 1e9
 """No turn of a LiDAR takes longer."""
-_CLASS_BITS = 0xFFFF  # of a label of SemanticKITTI, whose other bits number instances
 Columns = NDArray[np.void]
 
 
@@ -83,7 +83,7 @@ class Sweeps:
         if self._lidar.label_field is None:
             return None
         given = points[self._lidar.label_field]
-        return self._labels.label_ids(given & _CLASS_BITS if self._lidar.ids == "semantickitti" else given)
+        return self._labels.label_ids(given & CLASS_BITS if self._lidar.ids == "semantickitti" else given)
 
 
 def _intensity(points: Columns) -> NDArray[np.float32]:

@@ -36,6 +36,15 @@ class Inputs:
         )
         return [np.random.default_rng(list(hashlib.sha256(repr(key).encode()).digest())) for key in keys]
 
+    def drawn(self, share: float, seed: int) -> NDArray[np.bool_]:
+        """Draw a share of the windows, one by one: (B,)."""
+        return np.array([generator.random() < share for generator in self.generators(seed)])
+
+
+def in_windows(share: float) -> str:
+    """Say, behind what is wrong, in which share of the windows it is; nothing where it is in all."""
+    return "" if share == 1 else f" in {100 * share:g}% of the windows"
+
 
 class Disturbance(Config, ABC):
     """Settings of a disturbance: what is wrong with the inputs of the windows that are scored.

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.faults import not_one_of
-from semgrid_eval.windows.disturb.disturbance import Disturbance, Inputs
+from semgrid_eval.windows.disturb.disturbance import Disturbance, Inputs, in_windows
 
 
 class LostSensor(Disturbance):
@@ -22,9 +22,8 @@ class LostSensor(Disturbance):
     @property
     def words(self) -> str:
         """Say what is wrong."""
-        share = "" if self.strength == 1 else f" in {100 * self.strength:g}% of the windows"
         *others, last = self.sensors
-        return f"{', '.join(others)}{' and ' * bool(others)}{last} lost{share}"
+        return f"{', '.join(others)}{' and ' * bool(others)}{last} lost{in_windows(self.strength)}"
 
     def check(self, inputs: int, sensors: tuple[str, ...]) -> None:
         """Refuse to lose what the row does not have."""
@@ -34,7 +33,7 @@ class LostSensor(Disturbance):
 
     def apply(self, inputs: Inputs) -> Inputs:
         """Make the chosen sensors unknown."""
-        windows = [generator.random() < self.strength for generator in inputs.generators(self.seed)]
+        windows = inputs.drawn(self.strength, self.seed)
         sensors = [inputs.data.sensors[row] in self.sensors for row in inputs.sensor_rows.tolist()]
         lost = torch.from_numpy(np.outer(windows, sensors)).to(inputs.grids.device)
         return replace(inputs, grids=inputs.grids.masked_fill(lost[:, :, None, None, None], UNKNOWN))

@@ -3,11 +3,10 @@
 from dataclasses import replace
 from typing import Literal
 
-import numpy as np
 import torch
 from pydantic import Field
 
-from semgrid_eval.windows.disturb.disturbance import Disturbance, Inputs
+from semgrid_eval.windows.disturb.disturbance import Disturbance, Inputs, in_windows
 
 
 class ReversedOrder(Disturbance):
@@ -22,8 +21,7 @@ class ReversedOrder(Disturbance):
     @property
     def words(self) -> str:
         """Say what is wrong."""
-        share = "" if self.strength == 1 else f" in {100 * self.strength:g}% of the windows"
-        return f"inputs in reversed order{share}"
+        return f"inputs in reversed order{in_windows(self.strength)}"
 
     def check(self, inputs: int, sensors: tuple[str, ...]) -> None:
         """Refuse what has no order."""
@@ -32,8 +30,7 @@ class ReversedOrder(Disturbance):
 
     def apply(self, inputs: Inputs) -> Inputs:
         """Reverse all that belongs to the inputs of the chosen windows."""
-        drawn = [generator.random() < self.strength for generator in inputs.generators(self.seed)]
-        chosen = torch.from_numpy(np.array(drawn)).to(inputs.grids.device)
+        chosen = torch.from_numpy(inputs.drawn(self.strength, self.seed)).to(inputs.grids.device)
         return replace(
             inputs,
             grids=torch.where(chosen[:, None, None, None, None], inputs.grids.flip(2), inputs.grids),

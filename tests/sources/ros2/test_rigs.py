@@ -9,12 +9,13 @@ import pytest
 from support import ros_messages as ros
 from support.bags import write_bag
 from support.kitti_tree import Sequence
+from support.poles import POLE, Poles
 from support.rig_bags import Coding, RigBag
 from support.swept import START_NS, Drive, recorded, scanned, seen
-from support.toy_world import FRAME_NS, Box, ToyWorld
+from support.toy_world import FRAME_NS, ToyWorld
 from support.toy_world import Mount as Turned
 
-from semgrid_eval.classes import CLASS_NAMES, UNKNOWN
+from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.log.check import check_log
@@ -29,10 +30,9 @@ from semgrid_eval.sources.kitti.source import KittiOptions
 from semgrid_eval.sources.ros2.convert import convert_bags
 from semgrid_eval.sources.ros2.options import Ros2Options
 
-POLE = CLASS_NAMES.index("pole_sign")
 SPEC = GridSpec(rows=400, columns=400, cell_m=0.1, agent_row=200, agent_column=200)
 PLACES = [(x + 0.15, 9.15) for x in range(-24, 30, 3)]
-POLES = [Box("pole", x - 0.15, x + 0.15, y - 0.15, y + 0.15, 3.0) for x, y in PLACES]
+POLES = Poles(PLACES, SPEC)
 DRIVE = Drive(speed_mps=12.0, yaw_rate_radps=0.5)
 LIDAR_NS, LATE_NS = 100_000_000, 30_000_000
 
@@ -76,18 +76,9 @@ class Surround(ToyWorld):
 
 
 def toy(**cameras):
-    return Surround(POLES, speed_mps=DRIVE.speed_mps, yaw_rate_radps=DRIVE.yaw_rate_radps, frames=15, cameras=cameras)
-
-
-def pole_places_m(grid):
-    cells = np.argwhere(grid == POLE)
-    return (np.array([SPEC.agent_row, SPEC.agent_column]) - 0.5 - cells) * SPEC.cell_m
-
-
-def away_m(places_m, pose):
-    """How far from the nearest pole of the world cells are, seen from a pose, in the axes of the world."""
-    found = np.add(places_m, pose[:2])
-    return np.hypot(*(found[:, None] - np.array(PLACES)[None]).transpose(2, 0, 1)).min(axis=1)
+    return Surround(
+        POLES.boxes, speed_mps=DRIVE.speed_mps, yaw_rate_radps=DRIVE.yaw_rate_radps, frames=15, cameras=cameras
+    )
 
 
 def built(log, target, **sensors):
@@ -114,9 +105,9 @@ def test_front_and_rear_cameras_with_clocks_of_their_own_make_one_grid(tmp_path)
     for frame in range(1, 15):
         pose = DRIVE.pose_at(frame * FRAME_NS)
         for row, name in enumerate(seen_by):
-            places_m = pole_places_m(grids.grids[row, frame])
+            places_m = POLES.found_m(grids.grids[row, frame])
             seen_by[name] += len(places_m)
-            assert (away_m(places_m, pose) < 0.15 * math.sqrt(2) + 0.15).all()
+            assert (POLES.away_m(places_m, pose) < 0.15 * math.sqrt(2) + 0.15).all()
     assert min(seen_by.values()) > 100
     front, rear, both = grids.grids != UNKNOWN
     np.testing.assert_array_equal(both, front | rear)
@@ -164,11 +155,11 @@ def test_a_lidar_at_10_hz_and_a_camera_at_17_hz_30_ms_late_agree_in_one_grid(tmp
     for frame in range(1, 9):
         pose = DRIVE.pose_at(frame * LIDAR_NS)
         for row, reach_m in ((0, 0.05 * math.sqrt(2) + 0.01), (1, 0.15 * math.sqrt(2) + 0.15)):
-            places_m = pole_places_m(grids.grids[row, frame])
+            places_m = POLES.found_m(grids.grids[row, frame])
             told[row] += len(places_m)
-            assert (away_m(places_m, pose) < reach_m).all()
-        both = pole_places_m(grids.grids[2, frame])
-        assert (away_m(both, pose) < 0.15 * math.sqrt(2) + 0.15).all()
+            assert (POLES.away_m(places_m, pose) < reach_m).all()
+        both = POLES.found_m(grids.grids[2, frame])
+        assert (POLES.away_m(both, pose) < 0.15 * math.sqrt(2) + 0.15).all()
     assert min(told) > 60
 
     text = bag.map_text()
@@ -176,7 +167,8 @@ def test_a_lidar_at_10_hz_and_a_camera_at_17_hz_30_ms_late_agree_in_one_grid(tmp
     bent, _ = converted(tmp_path / "bent", messages, text, storage)
     wrong = built(bent, ("top", "front"), **sensors)
     off_m = [
-        away_m(pole_places_m(wrong.grids[0, frame]), DRIVE.pose_at(frame * LIDAR_NS)).max() for frame in range(1, 9)
+        POLES.away_m(POLES.found_m(wrong.grids[0, frame]), DRIVE.pose_at(frame * LIDAR_NS)).max()
+        for frame in range(1, 9)
     ]
     assert min(off_m) > 0.9, "in 0.09 s the vehicle drives 1.1 m"
 
