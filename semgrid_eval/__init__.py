@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from semgrid_eval.api import write_report as write_report
     from semgrid_eval.classes import CLASS_NAMES as CLASS_NAMES
     from semgrid_eval.classes import DEFAULT_CLASSES as DEFAULT_CLASSES
-    from semgrid_eval.classes import LABEL_ID as LABEL_ID
     from semgrid_eval.classes import ClassSet as ClassSet
     from semgrid_eval.classes import load_classes as load_classes
     from semgrid_eval.config import Config as Config
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
     from semgrid_eval.grids.recording import GridRecording as GridRecording
     from semgrid_eval.grids.spec import GridConfig as GridConfig
     from semgrid_eval.grids.spec import GridSpec as GridSpec
+    from semgrid_eval.labels import LABEL_ID as LABEL_ID
     from semgrid_eval.log.predictions import Prediction as Prediction
     from semgrid_eval.models.model import Baseline as Baseline
     from semgrid_eval.models.model import Given as Given
@@ -62,11 +62,12 @@ if TYPE_CHECKING:
 _NAMES = {
     "api": "build_grids check_log convert find_logs fit load_run make_model make_windows open_log plot_grid "
     "run score write_log write_report",
-    "classes": "CLASS_NAMES ClassSet DEFAULT_CLASSES LABEL_ID load_classes",
+    "classes": "CLASS_NAMES ClassSet DEFAULT_CLASSES load_classes",
     "config": "Config",
     "errors": "SemgridError",
     "grids.recording": "GridRecording",
     "grids.spec": "GridConfig GridSpec",
+    "labels": "LABEL_ID",
     "log.predictions": "Prediction",
     "models.model": "Baseline Given Model one_hot",
     "models.network": "Network NetworkSettings input_planes",

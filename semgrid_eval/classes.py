@@ -1,15 +1,12 @@
 """The classes of a semantic grid as one set: names, categories, priorities, colours, and the way from labels to them.
 
-Labels are Cityscapes', as logs have them. Which classes they become is a choice of the evaluation: the default set is
-the paper's ten (reading 21), and a grid's configuration may have another one.
+Which classes labels become is a choice of the evaluation: the default set is the paper's ten (reading 21), and a grid's
+configuration may have another one.
 """
 
-import csv
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from importlib import resources
-from itertools import islice
 from pathlib import Path
 from typing import Annotated, Literal, Self, TypeVar
 
@@ -19,6 +16,7 @@ from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
 from semgrid_eval.config import Config, load_yaml, parse_config
 from semgrid_eval.faults import meant, not_one_of, shown
+from semgrid_eval.labels import CITYSCAPES_LABELS, LABEL_ID
 
 NO_POINT = 255  # value of the class map for labels that give no point at all: sky, the ego vehicle, void
 UNKNOWN = 0
@@ -26,44 +24,6 @@ UNKNOWN = 0
 MASK_COLOUR = (255, 255, 255)
 _UNKNOWN_NAME = "unknown"
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class CityscapesLabel:
-    """A label of the Cityscapes label set: its id, train id (255 where it has none) and colour."""
-
-    name: str
-    label_id: int
-    train_id: int
-    colour: tuple[int, int, int]
-
-
-def _read_labels() -> Iterator[CityscapesLabel]:
-    """Read ids, train ids and colours, which are those that Cityscapes publishes."""
-    text = resources.files("semgrid_eval").joinpath("data/cityscapes_labels.csv").read_text(encoding="utf-8")
-    for name, label_id, train_id, red, green, blue in islice(csv.reader(text.splitlines()), 1, None):
-        yield CityscapesLabel(name, int(label_id), int(train_id), (int(red), int(green), int(blue)))
-
-
-CITYSCAPES_LABELS = tuple(_read_labels())
-LABEL_ID = {label.name: label.label_id for label in CITYSCAPES_LABELS}
-
-
-def label_ids_from_train_ids() -> NDArray[np.uint8]:
-    """Return the table (256,) from Cityscapes train id to label id; what is not a train id becomes 0 (unlabeled)."""
-    table = np.zeros(256, np.uint8)
-    for label in CITYSCAPES_LABELS:
-        if label.train_id != 255:
-            table[label.train_id] = label.label_id
-    return table
-
-
-def label_palette() -> NDArray[np.uint8]:
-    """Return the sRGB palette (256, 3) of label images: Cityscapes' colours, black beyond its ids."""
-    palette = np.zeros((256, 3), np.uint8)
-    for label in CITYSCAPES_LABELS:
-        palette[label.label_id] = label.colour
-    return palette
 
 
 def _label(value: object) -> object:

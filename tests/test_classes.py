@@ -4,18 +4,10 @@ import yaml
 from support.own_classes import FILE, class_set
 
 from semgrid_eval.class_files import default_classes_text, with_classes
-from semgrid_eval.classes import (
-    CITYSCAPES_LABELS,
-    CLASS_NAMES,
-    DEFAULT_CLASSES,
-    NO_POINT,
-    UNKNOWN,
-    ClassSet,
-    label_ids_from_train_ids,
-    load_classes,
-)
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES, NO_POINT, UNKNOWN, ClassSet, load_classes
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
+from semgrid_eval.labels import CITYSCAPES_LABELS, label_ids_from_train_ids
 from semgrid_eval.scores.metrics.iou import Iou
 
 OWN = parse_config(ClassSet, yaml.safe_load(FILE))

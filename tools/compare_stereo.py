@@ -20,11 +20,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, LABEL_ID, UNKNOWN
+from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.recording import GridRecording
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.recording.png import decode_gray

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_eval.classes import DEFAULT_CLASSES, label_palette
+from semgrid_eval.classes import DEFAULT_CLASSES
 from semgrid_eval.files import atomic_file
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.labels import label_palette
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.recording.png import decode_gray

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.progress import silent
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.sources.benchmarks import load_benchmark

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from semgrid_eval.classes import DEFAULT_CLASSES, LABEL_ID, NO_POINT, ClassSet
+from semgrid_eval.classes import DEFAULT_CLASSES, NO_POINT, ClassSet
 from semgrid_eval.config import Config
 from semgrid_eval.faults import meant, not_one_of
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.motion import Integrator
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sensors.kinds import Sensor, SensorName

@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from semgrid_eval.classes import CITYSCAPES_LABELS
+from semgrid_eval.labels import CITYSCAPES_LABELS
 from semgrid_eval.log import topics
 from semgrid_eval.log.contract import CAMERA, Contract, Latency, Range, RangeBeside, TopicContract
 from semgrid_eval.log.findings import Severity

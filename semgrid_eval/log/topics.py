@@ -3,7 +3,7 @@
 import json
 import re
 
-from semgrid_eval.classes import CITYSCAPES_LABELS
+from semgrid_eval.labels import CITYSCAPES_LABELS
 
 IMAGE = "image"
 DISPARITY = "disparity"

@@ -9,8 +9,8 @@ from google.protobuf.message import Message
 from mcap.writer import CompressionType, IndexType, Writer
 
 from semgrid_eval import __version__
-from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError, located
+from semgrid_eval.labels import label_palette
 from semgrid_eval.log import codec, topics
 from semgrid_eval.log.container import MAX_STAMP_NS
 from semgrid_eval.log.sweeps import sweep_message

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import cv2
 import numpy as np
 
-from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError, LogError, ResultError, SemgridError
 from semgrid_eval.executors import Executor
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.labels import label_palette
 from semgrid_eval.log import topics
 from semgrid_eval.log.container import damage_as_log_error
 from semgrid_eval.log.reader import LogReader

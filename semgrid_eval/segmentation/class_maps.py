@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CITYSCAPES_LABELS, LABEL_ID
 from semgrid_eval.config import Config, load_yaml, parse_config
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.faults import meant, not_one_of, shown
+from semgrid_eval.labels import CITYSCAPES_LABELS, LABEL_ID
 
 CITYSCAPES, CITYSCAPES_IDS = "cityscapes", "cityscapes-ids"
 _IN_FILES = ("mapillary", "ade20k")

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from semgrid_eval.classes import LABEL_ID, NO_POINT
+from semgrid_eval.classes import NO_POINT
 from semgrid_eval.errors import LogError
 from semgrid_eval.geometry import SE2
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.topics import TRUE_ACTORS
 from semgrid_eval.recording.road_map import RoadMap
 from semgrid_eval.recording.types import Actor

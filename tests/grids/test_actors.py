@@ -9,11 +9,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from support.toy_world import FRAME_NS, Box, ToyWorld, street
 
-from semgrid_eval.classes import CLASS_NAMES, LABEL_ID
+from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import LogError
 from semgrid_eval.grids.actors import MARGIN_M, MOVING_FROM_MPS, boxes_in_grid, draw_boxes
 from semgrid_eval.grids.build import build_grids, build_log
 from semgrid_eval.grids.spec import MOVING, STANDING, GridConfig, GridSpec
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.types import Actor, Pose
 

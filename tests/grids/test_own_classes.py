@@ -10,13 +10,14 @@ from hypothesis import strategies as st
 from support.own_classes import FILE, class_set, merged
 from support.toy_world import street
 
-from semgrid_eval.classes import DEFAULT_CLASSES, LABEL_ID, NO_POINT, ClassSet
+from semgrid_eval.classes import DEFAULT_CLASSES, NO_POINT, ClassSet
 from semgrid_eval.config import parse_config
 from semgrid_eval.files import digest_value
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.build import build_log, grid_key
 from semgrid_eval.grids.rasterise import grid_of
 from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.store import write_log
 from semgrid_eval.sensors.sensor import Points
 

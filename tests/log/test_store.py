@@ -8,8 +8,9 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from mcap.reader import make_reader
 from support.driving import CALIBRATION, FRAME_NS, START_NS, driving
 
-from semgrid_eval.classes import CLASS_NAMES, label_palette
+from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.labels import label_palette
 from semgrid_eval.log.codec import Scene
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs, read_recording, write_log

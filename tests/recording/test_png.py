@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from PIL import Image
 
-from semgrid_eval.classes import label_palette
 from semgrid_eval.errors import InputError
+from semgrid_eval.labels import label_palette
 from semgrid_eval.recording.png import (
     MAX_PIXELS,
     decode_colour,

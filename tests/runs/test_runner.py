@@ -8,9 +8,10 @@ import torch
 from support.small_runs import run, write_logs
 from support.toy_world import street
 
-from semgrid_eval.classes import CLASS_NAMES, LABEL_ID
+from semgrid_eval.classes import CLASS_NAMES
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.executors import Processes
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.types import Actor, Pose
 from semgrid_eval.scores import results

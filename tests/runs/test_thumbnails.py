@@ -10,13 +10,13 @@ from PIL import Image
 from support.own_clock import with_own_motion
 from support.toy_world import FRAME_NS, HEIGHT, START_NS, WIDTH, png, street
 
-from semgrid_eval.classes import LABEL_ID, label_palette
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.executors import InProcess, Processes
 from semgrid_eval.files import read_json
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.labels import LABEL_ID, label_palette
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.colour import read_size

@@ -1,7 +1,7 @@
 import pytest
 
-from semgrid_eval.classes import CITYSCAPES_LABELS, LABEL_ID, label_ids_from_train_ids
 from semgrid_eval.errors import ConfigError
+from semgrid_eval.labels import CITYSCAPES_LABELS, LABEL_ID, label_ids_from_train_ids
 from semgrid_eval.segmentation.class_maps import NAMES, find_class_map, maps_of
 
 

@@ -7,8 +7,8 @@ pytest.importorskip("onnx", reason="onnx, which makes the models, is not install
 from onnx import TensorProto, helper, numpy_helper
 from support.onnx_models import FLAT, colour_network, save
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import InputError
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.network import SegmentationNetwork
 

@@ -11,10 +11,11 @@ import pytest
 from support.swept import START_NS, recorded, sweep
 from support.toy_world import png
 
-from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES, LABEL_ID, NO_POINT
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES, NO_POINT
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import LogError
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.lidar import Mount

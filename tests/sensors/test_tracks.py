@@ -8,11 +8,12 @@ import pytest
 import torch
 from support.swept import START_NS, recorded
 
-from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, UNKNOWN
+from semgrid_eval.classes import CLASS_NAMES, UNKNOWN
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, LogError
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.road_map import FILE, RoadMap

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from support.driving import driving
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.recording.types import Moment, Recording
 
 TRAIN_COLOURS = {0: (1.0, 0.0, 0.0), 13: (0.0, 0.0, 1.0)}

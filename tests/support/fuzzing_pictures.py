@@ -9,7 +9,7 @@ import numpy as np
 from support.fuzzing_texts import corpus
 from support.fuzzing_ways import Inputs, changed_bytes
 
-from semgrid_eval.classes import label_palette
+from semgrid_eval.labels import label_palette
 from semgrid_eval.recording.png import decode_colour, decode_gray, decode_ids, encode_gray, require_pixels, with_palette
 
 

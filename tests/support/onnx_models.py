@@ -6,7 +6,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from semgrid_eval.classes import CITYSCAPES_LABELS
+from semgrid_eval.labels import CITYSCAPES_LABELS
 from semgrid_eval.segmentation.config import SegmentationConfig
 
 OPSET, IR_VERSION = 17, 8  # old enough for every ONNX Runtime that is allowed

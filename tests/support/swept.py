@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.recording.lidar import LidarSweep, Mount
 from semgrid_eval.recording.types import Moment, MotionSample, Recording
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment, MotionSample, Recording
 
 WIDTH, HEIGHT = 256, 128

@@ -1,6 +1,6 @@
 """Argoverse's categories as Cityscapes' labels, which logs hold."""
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 
 CATEGORIES: dict[str, str] = {
     "ANIMAL": "dynamic",

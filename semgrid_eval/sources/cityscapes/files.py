@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from semgrid_eval.classes import CITYSCAPES_LABELS, label_ids_from_train_ids
 from semgrid_eval.errors import InputError
 from semgrid_eval.faults import shown
 from semgrid_eval.files import read_bytes, read_json
+from semgrid_eval.labels import CITYSCAPES_LABELS, label_ids_from_train_ids
 from semgrid_eval.motion import implausible
 from semgrid_eval.recording.png import GRAY, PALETTE, PngHeader, decode_ids, encode_gray, require_pixels
 from semgrid_eval.recording.types import CameraCalibration, MotionSample

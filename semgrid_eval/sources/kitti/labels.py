@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import InputError
+from semgrid_eval.labels import LABEL_ID
 
 CLASS_BITS = 0xFFFF
 """Of a label; the others number instances."""

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import CITYSCAPES_LABELS, LABEL_ID
 from semgrid_eval.errors import InputError
+from semgrid_eval.labels import CITYSCAPES_LABELS, LABEL_ID
 from semgrid_eval.sources.kitti.labels import CLASSES
 from semgrid_eval.sources.ros2.mapping import HIGHEST_PIXEL, Ids
 

@@ -5,9 +5,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.config import Config, load_yaml, parse_config
 from semgrid_eval.errors import InputError
+from semgrid_eval.labels import LABEL_ID
 
 Topic = Annotated[str, Field(pattern=r"^/\S+$")]
 Positive = Annotated[float, Field(gt=0)]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import semgrid_eval
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.sources.town.solids import BOX, Texture, colours
 from semgrid_eval.sources.town.traffic import ROAD_USERS, Shape, Snapshot
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.sources.town.ground import CELL_M, Ground, Surface
 from semgrid_eval.sources.town.kinds import TownKind
 from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.sources.town.kinds import TownKind
 from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline
 from semgrid_eval.sources.town.solids import BoxRow, Texture, Tree, box, draw_tree

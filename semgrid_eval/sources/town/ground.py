@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.sources.town.network import Lane, LaneUse, Network, Polyline
 
 CELL_M = 0.2

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.recording.lidar import LidarSweep, Mount
 from semgrid_eval.sources.town.ground import SURFACE_COLOURS
 from semgrid_eval.sources.town.noise import LabelErrors, LabelNoise

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 
 Float32s = NDArray[np.float32]
 Labels = NDArray[np.uint8]

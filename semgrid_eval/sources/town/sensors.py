@@ -10,8 +10,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import MissingExtraError
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.recording.types import CameraCalibration, Pose
 from semgrid_eval.sources.town.ground import SURFACE_LABELS, Ground
 from semgrid_eval.sources.town.solids import Soup

@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.sources.town.columns import Columns
 
 Texture = IntEnum("Texture", "PLAIN FACADE ROOF FOLIAGE GLASS PLANKS", start=0)

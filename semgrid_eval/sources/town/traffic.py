@@ -6,8 +6,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.geometry import Floats
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.sources.town.columns import Arrays, Columns
 
 Shape = IntEnum("Shape", "CAR VAN TRUCK BUS BICYCLE PERSON", start=0)

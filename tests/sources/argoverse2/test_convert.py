@@ -22,10 +22,11 @@ from support.argoverse_log import (
     write_table,
 )
 
-from semgrid_eval.classes import CLASS_NAMES, LABEL_ID, UNKNOWN
+from semgrid_eval.classes import CLASS_NAMES, UNKNOWN
 from semgrid_eval.errors import InputError
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import MOVING, STANDING, GridConfig
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs, read_recording, write_log

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support.cityscapes_tree import Tree, fault, frames, only, put, sequences
 
-from semgrid_eval.classes import label_ids_from_train_ids, label_palette
 from semgrid_eval.errors import InputError
+from semgrid_eval.labels import label_ids_from_train_ids, label_palette
 from semgrid_eval.recording.png import decode_ids, encode_gray, with_palette
 
 

@@ -7,8 +7,8 @@ import pytest
 from click.testing import CliRunner
 from support.kitti_tree import BASELINE_M, CAMERA0_M, FOCAL_PX, SCANNER_M, STEP_NS, Sequence
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.cli.main import cli
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs

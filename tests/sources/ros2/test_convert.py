@@ -10,9 +10,9 @@ from support.onnx_models import colour_network
 from support.ros_messages import camera_info, compressed, matrix
 from support.toy_world import HEIGHT, WIDTH, street
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.convert import Work
 from semgrid_eval.log.reader import LogReader

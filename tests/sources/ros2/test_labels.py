@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import InputError
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.sources.ros2.labels import LabelTable
 from semgrid_eval.sources.ros2.mapping import HIGHEST_POINT
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from support.ros_messages import cloud, transforms
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import SE3
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.motion import EgoMotion, MotionSample
 from semgrid_eval.sources.ros2.lidars import LidarPlan, Sweeps, plan_lidar
 from semgrid_eval.sources.ros2.mapping import Extrinsics, LidarMap, PointTimes, VehicleMap

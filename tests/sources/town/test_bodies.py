@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.sources.town.bodies import boxes_of, heights_m
 from semgrid_eval.sources.town.solids import soup_of_boxes
 from semgrid_eval.sources.town.traffic import ROAD_USERS, Snapshot, type_index

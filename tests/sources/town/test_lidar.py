@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.lidar_rooms import MOUNT, empty, scenery, wall
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.sources.town.lidar import (
     ELEVATIONS_RAD,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.sources.town.noise import DisparityErrors, DisparityNoise, LabelErrors, LabelNoise
 
 SHAPE = (128, 256)

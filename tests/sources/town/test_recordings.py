@@ -11,9 +11,9 @@ import pytest
 from PIL import Image
 from support.towns import SMALL, small_plans, town_cache
 
-from semgrid_eval.classes import CITYSCAPES_LABELS, LABEL_ID
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError, InputError, MissingExtraError
+from semgrid_eval.labels import CITYSCAPES_LABELS, LABEL_ID
 from semgrid_eval.progress import silent
 from semgrid_eval.sources.town.config import SyntheticConfig
 from semgrid_eval.sources.town.recordings import plan_recordings

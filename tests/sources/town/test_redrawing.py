@@ -10,8 +10,8 @@ from support.cameras import calibration
 from support.towns import small_plans
 from support.toy_world import street
 
-from semgrid_eval.classes import LABEL_ID
 from semgrid_eval.errors import LogError, UnknownTruthError
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.disparity import coded_disparity, decoded_disparity

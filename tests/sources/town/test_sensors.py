@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.cameras import calibration, slow_point
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.sources.town.ground import Ground, Surface
 from semgrid_eval.sources.town.sensors import NO_TRIANGLE, Camera, RayCaster, cityscapes_camera, look

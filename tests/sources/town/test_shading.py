@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.recording.types import Pose
 from semgrid_eval.sources.town import shading
 from semgrid_eval.sources.town.ground import SURFACE_COLOURS, Ground, Surface

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.sources.town.ground import Surface
 from semgrid_eval.sources.town.kinds import KINDS
 from semgrid_eval.sources.town.network import read_network

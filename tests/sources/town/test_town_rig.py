@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from support.towns import small_plans
 
-from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES, LABEL_ID
+from semgrid_eval.classes import CLASS_NAMES, DEFAULT_CLASSES
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig, GridSpec
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log

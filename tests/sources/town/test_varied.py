@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from support.towns import SMALL, small_plans, town_cache
 
-from semgrid_eval.classes import LABEL_ID
+from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import read_recording, write_log
 from semgrid_eval.progress import silent
