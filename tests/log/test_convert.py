@@ -91,11 +91,12 @@ def test_interrupted_conversion_leaves_whole_logs_and_goes_on_from_there(tmp_pat
 
     with pytest.raises(KeyboardInterrupt):
         convert_jobs(jobs, tmp_path, Work(workers, stage=lambda label: nullcontext(interrupt)))
-    left = [f"val/{path.stem}" for path in sorted((tmp_path / "val").iterdir())]
+    left = [f"val/{path.stem}" for path in sorted((tmp_path / "val").glob("[!.]*"))]  # what was being written is hidden
     assert left if workers == 2 else left == ["val/a"]  # another process may have finished its own
     summary = convert(jobs, tmp_path)
     assert summary.skipped == left
     assert sorted([*summary.written, *summary.skipped]) == [f"val/{name}" for name in "abcdef"]
+    assert sorted(path.name for path in (tmp_path / "val").iterdir()) == [f"{name}.mcap" for name in "abcdef"]
 
 
 def test_a_full_disk_ends_the_conversion_in_one_line_and_what_is_written_stays(tmp_path, monkeypatch):
