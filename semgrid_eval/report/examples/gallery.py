@@ -26,6 +26,7 @@ class Group:
     seed: int | None  # of the predictions shown
     windows: tuple[Example, ...]
     problem: str
+    row: int  # number of the model's row
     looks_ahead: bool = False  # whether its rows look ahead differently far
     shown: bool = False  # whether the group is open when the page is opened
     aside: bool = False  # whether it is about another row than the page's main one
@@ -75,7 +76,8 @@ def groups_of(
     for end, picks in plan.items():
         title, hint, seed = _title(contest) + end, _hint(contest, windows[end]), contest.result.record.seed
         why = problem if picks else "No window has enough cells of any class."
-        found.append(Group(title, hint, contest.rule, seed, windows[end], why, looks_ahead=bool(contest.baselines)))
+        row, ahead = contest.model.number, bool(contest.baselines)
+        found.append(Group(title, hint, contest.rule, seed, windows[end], why, row, looks_ahead=ahead))
     return found
 
 

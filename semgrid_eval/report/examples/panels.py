@@ -25,6 +25,7 @@ class Column:
     note: str
     pictures: tuple[drawing.Picture, ...]
     step: bool = True  # whether it belongs to the way from the inputs over the target to the prediction
+    row: int | None = None  # number of the row whose answer it shows
 
     @property
     def grids(self) -> int:
@@ -90,7 +91,7 @@ class Shown:
             alt, theirs = f"Cells where {model.name} or {row.name} is right", self._answers[row.name][i]
             right = drawing.right_png(seen["target"], mine["prediction"], theirs["prediction"], seen["mask"] > 0)
             picture = drawing.Picture("", alt, drawing.data_uri(right))
-            yield Column("Who is right", "cell by cell", (picture,), step=False)
+            yield Column("Who is right", "cell by cell", (picture,), step=False, row=row.number)
         certainty = mine["certainty"]
         if certainty.min() < certainty.max():  # a baseline is equally certain of everything
             alt = f"Certainty of {model.name}, light is certain"
@@ -125,7 +126,7 @@ class Shown:
             yield Column(title, view.before(stamp_ns), (*view.photos(stamp_ns, title), *grids))
 
     def _answer(self, row: Row, i: int, *, step: bool) -> Column:
-        return Column(row.name, self._iou(row, i).removeprefix(", "), (self._prediction(row, i, ""),), step)
+        return Column(row.name, self._iou(row, i).removeprefix(", "), (self._prediction(row, i, ""),), step, row.number)
 
     def _prediction(self, row: Row, i: int, title: str, *, lead: bool = True) -> drawing.Picture:
         grid = self._answers[row.name][i]["prediction"]

@@ -24,8 +24,15 @@ MOST_MOMENTS = 10
 """At half a second each, nobody has to stop what plays by itself: it ends within five seconds."""
 _FEWEST_MOMENTS, _MOST_RIVALS, _BEST, _WORST = 3, 2, 2, 2
 Frames = Sequence[Frame | None]
-Column = Callable[[WindowRecord], Frames]
-"""Gives what a column of the grid shows of an example, by moment."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the grid of examples."""
+
+    title: str
+    show: Callable[[WindowRecord], Frames]  # what it shows of an example, by moment
+    rows: tuple[int, ...] = ()  # numbers of the rows whose answers it shows
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,7 @@ class Reel:
 
     title: str
     hint: str
-    columns: tuple[str, ...]
+    columns: tuple[tuple[int, ...], ...]  # numbers of the rows that each column is of, none for inputs and targets
     moments: tuple[str, ...]
     strips: tuple[Strip, ...]
 
@@ -54,19 +61,19 @@ class _Plan:
     title: str
     hint: str
     moments: Sequence[str]
-    columns: Sequence[tuple[str, Column]]
+    columns: Sequence[Column]
     windows: Sequence[WindowRecord]
 
     def draw(self, classes: ClassSet) -> Reel:
         strips = (
             Strip(
                 f"{window.recording}, frame {window.target_frame}",
-                tuple(strip_picture(name, column(window), classes) for name, column in self.columns),
+                tuple(strip_picture(column.title, column.show(window), classes) for column in self.columns),
             )
             for window in self.windows
         )
-        names = tuple(name for name, _ in self.columns)
-        return Reel(self.title, self.hint, names, tuple(self.moments), tuple(strips))
+        rows = tuple(column.rows for column in self.columns)
+        return Reel(self.title, self.hint, rows, tuple(self.moments), tuple(strips))
 
 
 class _Kept:
@@ -143,14 +150,14 @@ def _over_time(contest: Contest, kept: _Kept) -> _Plan | None:
         start = min(max(0, others.index(window) - count // 2), len(others) - count)
         return others[start : start + count]
 
-    def over(give: Callable[[Row, WindowRecord], Frame | None], row: Row) -> Column:
+    def over(give: Callable[[Row, WindowRecord], Frame | None], row: Row) -> Callable[[WindowRecord], Frames]:
         return lambda window: [give(row, each) for each in around(window)]
 
     model, rivals = contest.model, contest.rivals[:_MOST_RIVALS]
     since = moments_since([window.target_stamp_ns for window in around(picked[0])])
     hint = "Windows that follow each other: the newest input, the target, and what rows predicted."
-    columns = [("Newest input", over(kept.seen, model)), ("Target", over(kept.target, model))]
-    columns += [(row.name, over(kept.answer, row)) for row in (model, *rivals)]
+    columns = [Column("Newest input", over(kept.seen, model)), Column("Target", over(kept.target, model))]
+    columns += [Column(row.name, over(kept.answer, row), (row.number,)) for row in (model, *rivals)]
     return _Plan("Over time", hint, since, columns, picked)
 
 
@@ -163,13 +170,17 @@ def _over_leads(scores: Scores, kept: _Kept) -> _Plan | None:
     if not _FEWEST_MOMENTS <= len(line) == len(baselines):
         return None
 
-    def over(give: Callable[[Row, WindowRecord], Frame | None], asked: Sequence[Row]) -> Column:
+    def over(
+        give: Callable[[Row, WindowRecord], Frame | None], asked: Sequence[Row]
+    ) -> Callable[[WindowRecord], Frames]:
         return lambda window: [give(row, window) for row in asked]
 
     leads = [f"{row.shown.record.lead_s:.2f} s ahead" for row in line]
     hint = "The same targets from longer and then from shorter leads: the newest input, and what rows made of it."
-    columns = [("Newest input", over(kept.seen, line)), ("Target", over(kept.target, [line[-1]] * len(line)))]
-    columns += [(_span(asked), over(kept.answer, asked)) for asked in (line, baselines)]
+    targets = over(kept.target, [line[-1]] * len(line))
+    columns = [Column("Newest input", over(kept.seen, line)), Column("Target", targets)]
+    for asked in (line, baselines):
+        columns.append(Column(_span(asked), over(kept.answer, asked), tuple({row.number: None for row in asked})))
     return _Plan("From farther and from nearer", hint, leads, columns, _picked(Contest(line[-1], (baselines[-1],))))
 
 
@@ -193,6 +204,7 @@ def _up_to_target(contest: Contest, kept: _Kept) -> _Plan:
 
     before = [f"{ns / 1e9:.2f} s before the target" for ns in before_ns]
     hint = "What was seen, then the target, and what rows predicted of it."
-    columns: list[tuple[str, Column]] = [("Inputs, then the target", seen)]
-    columns += [(row.name, partial(answer, row)) for row in (model, *contest.rivals[:_MOST_RIVALS])]
+    asked = (model, *contest.rivals[:_MOST_RIVALS])
+    columns = [Column("Inputs, then the target", seen)]
+    columns += [Column(row.name, partial(answer, row), (row.number,)) for row in asked]
     return _Plan("Up to the target", hint, [*before, "the target"], columns, picked)

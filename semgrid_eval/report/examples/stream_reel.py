@@ -42,7 +42,7 @@ def stream_reel(found: Sequence[Strategy], classes: ClassSet) -> Reel | None:
     return Reel(
         "A recording, time by time",
         _HINT,
-        tuple(name for name, _ in columns),
+        ((), *((row.number,) for row in rows)),
         moments_since([int(first["evaluated_ns"][at]) for at in moments]),
         (Strip(recording, tuple(strip_picture(name, frames, classes) for name, frames in columns)),),
     )

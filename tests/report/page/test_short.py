@@ -55,10 +55,14 @@ def test_no_table_is_cut_on_a_phone_without_a_hint(browser, request, name):
 
 
 def _shown(browser, table):
+    return _seen(browser, f"{table} tr:not(.asked) th[scope=row] .name")
+
+
+def _seen(browser, parts):
     script = (
         "return [...document.querySelectorAll(arguments[0])].filter(e => e.offsetParent).map(e => e.innerText.trim())"
     )
-    return browser.execute_script(script, f"{table} tr:not(.asked) th[scope=row] .name")
+    return browser.execute_script(script, parts)
 
 
 UNCHECK = """
@@ -87,6 +91,12 @@ def test_what_is_chosen_holds_for_tables_and_figures_and_is_part_of_the_address(
     """
     parts, hidden = browser.execute_script(drawn)
     assert 0 < hidden < parts
+    played = _seen(browser, ".strip:first-child span")
+    assert played[:2] == ["Newest input", "Target"]
+    assert len(played) > 2
+    answers = _seen(browser, ".answers figcaption .name")
+    assert answers
+    assert not any(name.startswith("ED") for name in [*played, *answers])
     assert "of 33" in browser.execute_script("return document.querySelector('.chooser output').value")
 
 
