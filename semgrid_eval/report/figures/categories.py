@@ -20,7 +20,7 @@ from semgrid_eval.report.rows.words import question_words
 
 _GAP = 1.0  # between questions, in bars' places; the words of a question stand in it
 _BAR_IN, _AROUND_IN = 0.19, 0.75  # height of a bar's place, and of title, legend and axis together
-_WIDE_IN = 11.3  # all of the page
+_LEAST_REACH = 0.05  # of a panel whose bars are all shorter, so that the numbers at its ticks are short, too
 _ROOM = 1.2  # width of a panel by its longest bar, which leaves room for the numbers
 
 
@@ -39,19 +39,22 @@ def category_plots(scores: Scores) -> list[style.Plot]:
     if not groups:
         return []
     places = [place for group in groups for place in group.places.values()]
-    size_in = (_WIDE_IN, _AROUND_IN + _BAR_IN * (max(places) + 1 + _GAP))
+    iou = shared_iou(scores.values())
+    names = iou.classes.category_names
+    rows_of_panels, columns = style.panel_grid(len(names))
+    height_in = rows_of_panels * (_AROUND_IN + _BAR_IN * (max(places) + 1 + _GAP))
     with mpl.rc_context(style.SETTINGS):
-        figure = Figure(figsize=size_in, layout="constrained")
-        names = shared_iou(scores.values()).classes.category_names
-        panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
+        figure = Figure(figsize=(style.WIDE_IN, height_in), layout="constrained")
+        panels = style.draw_panels(figure, [iou.labels[name] for name in names], sharey=True)
         colours = style.family_colours(entry.row for entry in scores.values() if not entry.row.uses_truth)
         strokes = style.truth_strokes(entry.row for entry in scores.values())
         for axes, category in zip(panels, names, strict=True):
             reach = _panel(axes, scores, category, groups, colours)
             reach = max([reach, *_draw_told(axes, category, groups, strokes)])
-            axes.set_xlim(0, _ROOM * max(reach, 1e-3))
+            axes.set_xlim(0, _ROOM * max(reach, _LEAST_REACH))
             axes.set_xticks([tick for tick in axes.get_xticks() if tick <= 1])
-        _name_rows(panels[0], groups)
+        for first in panels[::columns]:
+            _name_rows(first, groups)
         handles: list[Artist] = [Patch(color=colour) for colour in colours.values()]
         handles += [Line2D([], [], color=style.INK, linestyle=stroke) for stroke in strokes.values()]
         labels = [style.short(name.replace("_", " ")) for name in (*colours, *strokes)]
@@ -83,7 +86,6 @@ def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group], c
     for name, place in (item for group in groups for item in group.places.items()):
         entry = scores[name]
         longest = max(longest, _bar(axes, entry, category, place, colours[entry.row.record.facts.family]))
-    axes.set_title(shared_iou(scores.values()).labels[category], loc="left", fontweight="bold")
     axes.set_xlabel("IoU")
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
@@ -151,18 +153,19 @@ def horizon_plots(scores: Scores) -> list[style.Plot]:
         return []
     drawn = {entry.row.name: entry for line in lines for entry in line}
     with mpl.rc_context(style.SETTINGS):
-        figure = Figure(figsize=(11.3, 3.0), layout="constrained")
         iou = shared_iou(drawn.values())
         names = iou.classes.category_names
-        for axes, category in zip(figure.subplots(1, len(names), sharex=True, squeeze=False)[0], names, strict=True):
+        rows_of_panels, columns = style.panel_grid(len(names))
+        figure = Figure(figsize=(style.WIDE_IN, 3.0 * rows_of_panels), layout="constrained")
+        panels = style.draw_panels(figure, [iou.labels[name] for name in names], sharex=True)
+        for axes, category in zip(panels, names, strict=True):
             for index, line in enumerate(lines):
                 colour = style.INK if line[0].row.uses_truth else style.PALETTE[index % len(style.PALETTE)]
                 _line(axes, line, category, colour)
-            axes.set_title(iou.labels[category], loc="left", fontweight="bold")
             axes.set_xticks(leads := sorted({_lead_s(e) for e in drawn.values()}), [f"{lead:.2f}" for lead in leads])
             axes.margins(x=0.12)
-        figure.axes[0].set_ylabel("IoU")
-        legend = figure.axes[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        panels[0].set_ylabel("IoU")
+        legend = panels[columns - 1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
         style.mark_legend(legend, [[entry.row for entry in line] for line in lines])
         figure.supxlabel("lead time / s: from the newest input to the target", fontsize=9)
         caption = "Category IoU over the lead time with 95% intervals, a line for rows that differ in the horizon alone"

@@ -23,15 +23,15 @@ def distance_plots(parts: Parts, rows: Sequence[Row]) -> list[style.Plot]:
         return []
     strokes, iou = _strokes(lines), shared_iou([line[0] for line in lines])
     with mpl.rc_context(style.SETTINGS):
-        figure = Figure(figsize=(11.3, 2.7), layout="constrained")
-        panels = figure.subplots(1, len(iou.compared), sharex=True)
+        rows_of_panels, columns = style.panel_grid(len(iou.compared))
+        figure = Figure(figsize=(style.WIDE_IN, 2.7 * rows_of_panels), layout="constrained")
+        panels = style.draw_panels(figure, [iou.labels[column] for column in iou.compared], sharex=True)
         for axes, column in zip(panels, iou.compared, strict=True):
             for line, stroke in zip(lines, strokes, strict=True):
                 _draw(axes, line, column, stroke)
-            axes.set_title(iou.labels[column], loc="left", fontweight="bold")
             axes.set_xticks(range(len(parts)), [_short_band(name) for name in parts], fontsize=7)
         panels[0].set_ylabel("IoU")
-        legend = panels[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        legend = panels[columns - 1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
         style.mark_legend(legend, [[line[0].row] for line in lines])
         figure.supxlabel("distance / m", fontsize=9)
         caption = f"{_CAPTION} ({style.evidence({line[0].row.name: line[0] for line in lines})})."

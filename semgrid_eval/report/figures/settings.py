@@ -13,7 +13,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
-from semgrid_eval.report.figures.style import INK, PALETTE, SETTINGS, Plot, evidence, finish, mark, mark_legend, short
+from semgrid_eval.report.figures.style import (
+    INK,
+    PALETTE,
+    SETTINGS,
+    WIDE_IN,
+    Plot,
+    evidence,
+    finish,
+    mark,
+    mark_legend,
+    short,
+)
 from semgrid_eval.report.rows.pairing import HEADLINE, settings_of
 
 COLUMNS = ("figure", "row", "setting", "value", "by", "by_value", "parameters", "iou", "low", "high")
@@ -60,7 +71,7 @@ def settings_plots(scores: Scores) -> list[Plot]:
 
 def _plot(varied: Varied, name: str) -> Plot:
     with mpl.rc_context(SETTINGS):
-        figure = Figure(figsize=(11.3, 3.4), layout="constrained")
+        figure = Figure(figsize=(WIDE_IN, 3.4), layout="constrained")
         score, time, front = panels = figure.subplots(1, 3)
         for index, line in enumerate(lines := varied.lines()):
             _draw_line(panels, varied, line, index, aside=index - (len(lines) - 1) / 2)

@@ -2,14 +2,17 @@
 
 import io
 import re
+import textwrap
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import ceil
 from typing import Any
 
 import numpy as np
 from markupsafe import escape
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
@@ -56,6 +59,9 @@ _MARK = "row-"
 _ROWS = re.compile(r"row-([\d-]+)\.\d+")
 _NAME_CHARACTERS = 24
 _PICTURE_DPI = 160
+WIDE_IN = 11.3
+"""All of the page."""
+_PANELS_IN_A_ROW, _TITLE_CHARACTERS = 5, 16
 
 
 @dataclass(frozen=True)
@@ -121,6 +127,24 @@ def line_style(index: int) -> dict[str, Any]:
     """Return the colour and stroke of one of many lines."""
     colours = len(PALETTE)
     return {"color": PALETTE[index % colours], "linestyle": STROKES[index // colours % len(STROKES)]}
+
+
+def panel_grid(count: int) -> tuple[int, int]:
+    """Return in how many rows, of how many panels each, as many panels as that fit on a page."""
+    rows = ceil(count / _PANELS_IN_A_ROW)
+    return rows, ceil(count / rows)
+
+
+def draw_panels(figure: Figure, titles: Sequence[str], **shared: Any) -> list[Axes]:  # noqa: ANN401 - `subplots`' own
+    """Add a panel for each title, row by row as `panel_grid` says."""
+    found: list[Axes] = figure.subplots(*panel_grid(len(titles)), squeeze=False, **shared).ravel().tolist()
+    for spare in found[len(titles) :]:
+        spare.remove()
+    panels = found[: len(titles)]
+    for axes, title in zip(panels, titles, strict=True):
+        axes.set_title(textwrap.fill(title, _TITLE_CHARACTERS), loc="left", fontweight="bold")
+        axes.tick_params(labelbottom=True)  # below a panel of an upper row there may be none
+    return panels
 
 
 def short(name: str, characters: int = _NAME_CHARACTERS) -> str:

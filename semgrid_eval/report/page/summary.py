@@ -18,6 +18,8 @@ from semgrid_eval.report.tables.targets import fusion_sentence, not_compared_sen
 from semgrid_eval.report.tables.truth import way_sentence
 
 _FEW_RECORDINGS, _FEW_SEEDS = 10, 5
+_UNSURE = "may be chance"
+"""What a difference without interval is called: "not clearly different" says that there is one, which includes zero."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,8 @@ def _name(row: Row) -> Markup:
 
 
 def _verdict(difference: Estimate) -> str:
-    return f"{VERDICTS[verdict(difference)]} ({interval_phrase(difference, with_sign=True)})"
+    word = VERDICTS[verdict(difference)] if isfinite(difference.low) else f"which {_UNSURE}"
+    return f"{word} ({interval_phrase(difference, with_sign=True)})"
 
 
 def _evidence(runs: Sequence[Run], rows: Sequence[Row]) -> str:
@@ -155,8 +158,9 @@ def _tile(label: str, difference: Estimate, reach: float, behind: str) -> Tile:
         return Tile(label, value, "", tone, "absent", title)
     ends = (v if isfinite(v) else difference.value for v in (difference.value, difference.low, difference.high))
     places = (round(50 + 50 * end / reach, 1) for end in ends)
-    note = interval(difference, with_sign=True) or "no interval"
-    return Tile(label, value, note, tone, VERDICTS[tone], title, *places)
+    note = interval(difference, with_sign=True)
+    word = VERDICTS[tone] if note else _UNSURE
+    return Tile(label, value, note or "no interval", tone, word, title, *places)
 
 
 def _kind(best: Row, rival: Row) -> str:

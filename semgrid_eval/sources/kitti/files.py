@@ -10,7 +10,7 @@ from semgrid_eval.errors import InputError, located
 from semgrid_eval.files import read_bytes
 from semgrid_eval.geometry import SE3
 from semgrid_eval.recording.lidar import MAX_POINTS
-from semgrid_eval.sources.kitti.labels import CLASS_BITS, label_ids
+from semgrid_eval.sources.kitti.labels import classes_of, label_ids
 
 MAX_FILE_BYTES = 1 << 28
 _MAX_TIME_S = 1e9
@@ -76,7 +76,7 @@ def read_labels(path: Path) -> NDArray[np.uint8]:
     data = read_file(path)
     if len(data) % _LABEL_BYTES:
         raise InputError(f"has {len(data)} bytes, which are not labels of {_LABEL_BYTES} bytes", path=path)
-    classes = (np.frombuffer(data, "<u4") & CLASS_BITS).astype(np.uint16)
+    classes = classes_of(np.frombuffer(data, "<u4"))
     with located(path=path):
         return label_ids(classes)
 

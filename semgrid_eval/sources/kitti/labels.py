@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from semgrid_eval.errors import InputError
 from semgrid_eval.labels import LABEL_ID
 
-CLASS_BITS = 0xFFFF
-"""Of a label; the others number instances."""
 CLASSES: dict[int, tuple[str, str]] = {
     0: ("unlabeled", "unlabeled"),
     1: ("outlier", "unlabeled"),
@@ -50,6 +48,11 @@ _NO_CLASS = 255
 _TABLE = np.full(1 << 16, _NO_CLASS, np.uint8)
 for _number, (_, _label) in CLASSES.items():
     _TABLE[_number] = LABEL_ID[_label]
+
+
+def classes_of(labels: NDArray[np.integer]) -> NDArray[np.uint16]:
+    """Return the classes of labels of any integer type (N,): their lower 16 bits; the others number instances."""
+    return labels.astype(np.uint16)
 
 
 def label_ids(classes: NDArray[np.uint16]) -> NDArray[np.uint8]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from semgrid_eval.sources.kitti.labels import CLASS_BITS, CLASSES
+from semgrid_eval.sources.kitti.labels import CLASSES, classes_of
 from semgrid_eval.sources.ros2.clouds import NUMBERS, WHOLE, columns_of, type_of
 from semgrid_eval.sources.ros2.labels import likely_ids
 from semgrid_eval.sources.ros2.lidars import LONGEST_NS, NS_BY_UNIT
@@ -77,6 +77,6 @@ def _times(field: str, values: Any) -> PointTimes | None:  # noqa: ANN401 - an a
 
 def _ids(ids: Any) -> str:  # noqa: ANN401 - an array (N,) of whole numbers
     highest = int(ids.max(initial=0))
-    if highest > _LAST_LABEL_ID and np.isin(ids & CLASS_BITS, list(CLASSES)).all():
+    if highest > _LAST_LABEL_ID and np.isin(classes_of(ids), list(CLASSES)).all():
         return "semantickitti"
     return likely_ids(highest)

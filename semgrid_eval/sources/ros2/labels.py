@@ -51,6 +51,6 @@ def _given(ids: str | Ids) -> Ids:
         names = {name for _, name in CLASSES.values()}
         return {name: tuple(number for number, (_, label) in CLASSES.items() if label == name) for name in names}
     if ids == "label_ids":
-        return {label.name: (label.label_id,) for label in CITYSCAPES_LABELS if label.label_id >= 0}
-    trained = {label.name: (label.train_id,) for label in CITYSCAPES_LABELS if 0 <= label.train_id < _NO_TRAIN_ID}
+        return {label.name: (label.label_id,) for label in CITYSCAPES_LABELS}
+    trained = {label.name: (label.train_id,) for label in CITYSCAPES_LABELS if label.train_id != _NO_TRAIN_ID}
     return {**trained, "unlabeled": (_NO_TRAIN_ID,)}

@@ -11,7 +11,7 @@ from semgrid_eval.geometry import SE3
 from semgrid_eval.motion import EgoMotion
 from semgrid_eval.recording.lidar import LidarSweep, Mount
 from semgrid_eval.sources.deskewing import deskewed
-from semgrid_eval.sources.kitti.labels import CLASS_BITS
+from semgrid_eval.sources.kitti.labels import classes_of
 from semgrid_eval.sources.ros2.clouds import INTENSITY, PLACE, columns_of
 from semgrid_eval.sources.ros2.labels import LabelTable
 from semgrid_eval.sources.ros2.mapping import HIGHEST_POINT, LidarMap, PointTimes, VehicleMap
@@ -83,7 +83,7 @@ class Sweeps:
         if self._lidar.label_field is None:
             return None
         given = points[self._lidar.label_field]
-        return self._labels.label_ids(given & CLASS_BITS if self._lidar.ids == "semantickitti" else given)
+        return self._labels.label_ids(classes_of(given) if self._lidar.ids == "semantickitti" else given)
 
 
 def _intensity(points: Columns) -> NDArray[np.float32]:

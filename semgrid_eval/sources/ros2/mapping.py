@@ -166,9 +166,13 @@ def load_map(path: Path) -> BagMap:
 
 
 def _require_labels(ids: str | Ids, highest: int) -> None:
-    """Make sure that ids are given to labels of Cityscapes, and are not beyond what a label can hold."""
+    """Make sure that ids are given to labels of Cityscapes, each to one, and are not beyond what a label can hold."""
+    owners: dict[int, str] = {}
     for name, given in ids.items() if isinstance(ids, dict) else ():
         if name not in LABEL_ID:
             raise ValueError(f"ids: {name!r} is not one of {', '.join(LABEL_ID)}")
-        if wrong := [each for each in given if not 0 <= each <= highest]:
-            raise ValueError(f"ids: {wrong[0]} is not within 0 to {highest}")
+        for each in given:
+            if not 0 <= each <= highest:
+                raise ValueError(f"ids: {each} is not within 0 to {highest}")
+            if owners.setdefault(each, name) != name:
+                raise ValueError(f"ids: {each} is given to {owners[each]} and to {name}")

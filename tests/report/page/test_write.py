@@ -229,6 +229,13 @@ def test_a_class_in_neither_target_nor_prediction_is_a_dash_and_empty(lonely):
     assert read_json(lonely.parent / "report.json")["rows"]["BL-DC"]["scores"][absent[0]]["value"] is None
 
 
+def test_a_tile_marks_a_difference_only_where_there_is_one(tmp_path):
+    rows = FakeRow("DC", "BL"), FakeRow("DC", "ED")
+    text = write_report(make_fake_run(tmp_path / "run", rows=rows, recordings=1, windows=1)).read_text(encoding="utf-8")
+    tiles = text.partition('<ul class="tiles">')[2].partition("</ul>")[0].split("<li ")[1:]
+    assert {("absent" in tile, 'class="at"' in tile) for tile in tiles} == {(True, False), (False, True)}
+
+
 def test_zero_windows(tmp_path):
     page = write_report(make_fake_run(tmp_path / "run", recordings=0))
     text = _read(page).text

@@ -122,6 +122,17 @@ def test_what_is_nowhere_is_not_compared():
     assert words["Vehicles"] == ("\N{EN DASH}", "absent")
 
 
+def test_a_difference_without_interval_may_be_chance():
+    rows = [counted_row(name, {"road": [hits]}) for name, hits in (("BL-DC", 50), ("ED-DC", 60))]
+    scores = score_rows(rows, np.random.default_rng(0))
+    summary = summarise([Run(Path(), "", None, tuple(rows))], scores, headline(scores))
+    assert summary.sentences[0].endswith("over BL-DC, the best baseline, which may be chance (no interval).")
+    assert summary.sentences[1].endswith("With fewer than two recordings there are no intervals.")
+    words = {tile.label: (tile.note, tile.word) for tile in summary.tiles}
+    assert words["Static (known)"] == ("no interval", "may be chance")
+    assert words["Vehicles"] == ("", "absent")
+
+
 def test_only_rows_with_as_many_inputs_are_compared_first():
     more = counted_row("ED-SL5", {"road": [90] * 12})
     facts = more.record.facts.model_copy(update={"inputs": 5})

@@ -258,6 +258,7 @@ def map_fault(here, text):
             "one of disparity, depth and right is needed, not disparity and de",
         ),
         ("ids: label_ids", "ids: {rode: [1]}", "'rode' is not one of unlabeled, "),
+        ("ids: label_ids", "ids: {road: [1], car: [2, 1]}", "ids: 1 is given to road and to car"),
         ("rectified: true", "rectified: 1", "cameras.front.rectified: "),
         ("right_info: /stereo/right/camera_info", "extrinsics: {x_m: , y_m: 0.0, z_m: 1.0}", "extrinsics.x_m: "),
     ],

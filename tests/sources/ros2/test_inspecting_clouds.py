@@ -87,11 +87,18 @@ def test_what_cannot_be_guessed_is_left_open(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("labels", "ids"),
-    [([0, 13, 18, 2], "train_ids"), ([7, 26, 33, 0], "label_ids"), ([40, 252, 7 << 16, 70], "semantickitti")],
+    ("labels", "kind", "ids"),
+    [
+        ([0, 13, 18, 2], np.uint32, "train_ids"),
+        ([7, 26, 33, 0], np.uint32, "label_ids"),
+        ([40, 252, 7 << 16, 70], np.uint32, "semantickitti"),
+        ([40, 252, 10, 70], np.uint8, "semantickitti"),
+        ([40, 252, 10, 70], np.int16, "semantickitti"),
+        ([35, 0, 0, 0], np.uint8, "label_ids"),
+    ],
 )
-def test_ids_of_labels_are_guessed(tmp_path, labels, ids):
-    assert f"    ids: {ids}  # the first" in drafted(tmp_path, PLACE | {"label": np.array(labels, np.uint32)})
+def test_ids_of_labels_are_guessed(tmp_path, labels, kind, ids):
+    assert f"    ids: {ids}  # the first" in drafted(tmp_path, PLACE | {"label": np.array(labels, kind)})
 
 
 def test_clouds_that_are_made_of_pictures_are_left_out(tmp_path):

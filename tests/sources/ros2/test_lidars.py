@@ -84,6 +84,13 @@ def test_labels_of_semantickitti_lose_their_instances():
     assert found.label_id.tolist() == [LABEL_ID["road"], LABEL_ID["car"]]
 
 
+@pytest.mark.parametrize("kind", [np.uint8, np.int16, np.uint16, np.int32])
+def test_labels_of_semantickitti_without_instances_fit_into_small_numbers(kind):
+    lidar = LidarMap(cloud="/points", label_field="label", ids="semantickitti")
+    found = sweep(columns((1, 2, 3), (1, 2, 4)) | {"label": np.array([40, 10], kind)}, lidar)
+    assert found.label_id.tolist() == [LABEL_ID["road"], LABEL_ID["car"]]
+
+
 def test_a_label_that_the_map_does_not_name():
     lidar = LidarMap(cloud="/points", label_field="label", ids={"road": (1,)})
     with pytest.raises(InputError, match=r"^ids: 70000 is a label, but not in the map$"):
