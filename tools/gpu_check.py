@@ -1,7 +1,8 @@
-"""Check semgrid-eval on a GPU, on a machine without a network: tests, rates, and the paper at its own scale.
+"""Check semgrid-eval on a GPU, on a machine without a network: tests, rates, the paper at its own scale, presets.
 
 Example: python tools/gpu_check.py pack CARRY --logs LOGS
          python tools/gpu_check.py run --data CARRY --out OUT --part tests:90 --part rates:150 --part paper:270
+         python tools/gpu_check.py run --data CARRY --out OUT --part reference:200 --weights reference --jobs 8
 """
 
 import argparse
@@ -10,27 +11,27 @@ import re
 import signal
 import subprocess
 import sys
-import tarfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from shutil import copyfile, rmtree
+from shutil import rmtree
 from typing import Any, TypeVar
 
 import torch
 
+from semgrid_eval.bench.archives import pack_run
 from semgrid_eval.bench.gpu import SHARE_GOAL, SMOKE, Size, measure_gpu
 from semgrid_eval.bench.measurement import Measurement
-from semgrid_eval.bench.paper import AGAINST, paper_matrix, price_of_paper, scores_of
+from semgrid_eval.bench.paper import AGAINST, matrix_of_grids, paper_matrix, price_of_paper, scores_of
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import Executor, InProcess, Processes, WorkerDied, available_cores
 from semgrid_eval.files import read_json, write_json
 from semgrid_eval.grids.spec import GridConfig
-from semgrid_eval.models.checkpoint import WEIGHTS_FILE, read_header
 from semgrid_eval.models.device import choose_device, visible_gpus
 from semgrid_eval.progress import silent_stage
 from semgrid_eval.runs.data import RunData
+from semgrid_eval.runs.matrix import Matrix, preset_names
 from semgrid_eval.runs.packed import pack_grids
 from semgrid_eval.runs.record import machine, versions
 from semgrid_eval.runs.runner import RunOptions, run_matrix
@@ -42,6 +43,8 @@ ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "reports" / "reference"
 BUDGET_S = {"tests": 90, "rates": 150, "paper": 270}
 """The parts, and for how many seconds each may work unless it is said otherwise."""
+PRESET_S = 200
+"""For how many seconds a preset may work unless it is said otherwise."""
 WORTH_SHARING = 1.15
 """How many times as fast several processes must train together, that rows are trained beside each other."""
 
@@ -56,6 +59,12 @@ class Place:
     device: str
     commit: str
     smoke: bool
+    jobs: int | None = None  # processes that train at once, by default as many as `rates` advises
+
+    @property
+    def run(self) -> Path:
+        """Where a part runs a matrix."""
+        return self.out.with_name(f"{self.out.name}-work") / self.part / "run"
 
     def keep(self, *, complete: bool = False, **figures: object) -> None:
         """Write what is known so far with the card, the versions and the commit that it was measured with."""
@@ -110,12 +119,21 @@ def check_paper(place: Place) -> None:
 
     It begins anew each time: what an earlier run has trained would cost this one nothing, and the price be too low.
     """
-    matrix = paper_matrix(smoke=place.smoke)
-    count, run = processes_at_once(place.out / "rates.json"), run_folder(place.out)
-    rmtree(run, ignore_errors=True)
+    rmtree(place.run, ignore_errors=True)
+    train_and_score(place, paper_matrix(smoke=place.smoke), lambda: {"whole_preset": price_of_paper(place.run)})
+
+
+def check_preset(place: Place) -> None:
+    """Train and score what a preset has for grids alone; what an earlier run has trained is found."""
+    train_and_score(place, matrix_of_grids(place.part, smoke=place.smoke), dict)
+
+
+def train_and_score(place: Place, matrix: Matrix, more: Callable[[], dict[str, object]]) -> None:
+    """Run a matrix, and keep its scores, and what else is told of it, after each row."""
+    count, run = place.jobs or processes_at_once(place.out / "rates.json"), place.run
 
     def keep(*, complete: bool = False) -> None:
-        place.keep(complete=complete, processes=count, rows=scores_of(run, REFERENCE), whole_preset=price_of_paper(run))
+        place.keep(complete=complete, processes=count, rows=scores_of(run, REFERENCE), **more())
 
     inner = Processes(count, gpus=visible_gpus()[:1]) if count > 1 else InProcess()
     options = RunOptions(place.device, run / "grids", "gpu_check.py", executor=Telling(inner, keep), pictures=False)
@@ -147,12 +165,8 @@ class Telling:
             self._tell()
 
 
-PARTS = {"tests": check_tests, "rates": check_rates, "paper": check_paper}
-
-
-def run_folder(out: Path) -> Path:
-    """Where the part `paper` works."""
-    return out.with_name(f"{out.name}-work") / "run"
+CHECKS = {"tests": check_tests, "rates": check_rates, "paper": check_paper}
+PARTS = (*CHECKS, *(name for name in preset_names() if name not in CHECKS))
 
 
 def run_parts(chosen: argparse.Namespace) -> bool:
@@ -165,8 +179,7 @@ def run_parts(chosen: argparse.Namespace) -> bool:
     for part, budget_s in chosen.part or BUDGET_S.items():
         started_s, ends_s = time.monotonic(), ends_s + budget_s
         ended = in_time([*sys.argv[:1], "part", part, *passed_on(chosen)], max(0.0, ends_s - started_s))
-        if part == "paper":
-            keep_run(run_folder(chosen.out), chosen.out)
+        pack_run(place_of(chosen, part).run, chosen.out / part, weights=part in chosen.weights)
         took_s = time.monotonic() - started_s
         sys.stdout.write(f"\n== {part}: {ended} after {took_s:.0f} s\n{table(chosen.out / f'{part}.json')}\n")
         sys.stdout.flush()
@@ -191,19 +204,13 @@ def in_time(arguments: list[str], budget_s: float) -> str:
 def passed_on(chosen: argparse.Namespace) -> list[str]:
     """Return the options that each part gets."""
     options = ["--data", chosen.data, "--out", chosen.out, "--device", chosen.device, "--commit", chosen.commit]
-    return [*map(str, options), *(["--smoke"] if chosen.smoke else [])]
+    more = [*(["--smoke"] if chosen.smoke else []), *(["--jobs", chosen.jobs] if chosen.jobs else [])]
+    return [*map(str, options), *map(str, more)]
 
 
-def keep_run(run: Path, out: Path) -> None:
-    """Pack the run, so that a report can be made of it elsewhere, and keep the weights of its first network."""
-    for name, parts in {"run": ["run.json", "results"], "windows": ["windows"]}.items():
-        with tarfile.open(out / f"paper-{name}.tar.gz", "w:gz") as archive:
-            for part in parts:
-                if (run / part).exists():
-                    archive.add(run / part, f"run/{part}")
-    finished = sorted((run / "trainings").glob(f"*/{WEIGHTS_FILE}"), key=lambda path: path.stat().st_mtime)
-    for weights in finished[:1]:
-        copyfile(weights, out / f"{read_header(weights)['model']}.safetensors")
+def place_of(chosen: argparse.Namespace, part: str) -> Place:
+    """Return what a part works with."""
+    return Place(part, chosen.data, chosen.out, chosen.device, chosen.commit, chosen.smoke, chosen.jobs)
 
 
 def table(path: Path) -> str:
@@ -248,7 +255,7 @@ def budget(text: str) -> tuple[str, float]:
     part, _, seconds = text.partition(":")
     if part not in PARTS:
         raise argparse.ArgumentTypeError(f"{part!r} is not one of {', '.join(PARTS)}")
-    return part, float(seconds or BUDGET_S[part])
+    return part, float(seconds or BUDGET_S.get(part, PRESET_S))
 
 
 def parser() -> argparse.ArgumentParser:
@@ -260,7 +267,8 @@ def parser() -> argparse.ArgumentParser:
     packing.add_argument("--logs", type=Path, required=True)
     packing.add_argument("--cache", type=Path, help="folder of grids that are built already")
     running = commands.add_parser("run", help="work on parts, each for so many seconds")
-    running.add_argument("--part", type=budget, action="append", help="tests, rates or paper, with :SECONDS")
+    running.add_argument("--part", type=budget, action="append", help="tests, rates, paper or a preset, with :SECONDS")
+    running.add_argument("--weights", action="append", default=[], help="a part whose trained weights are packed, too")
     one = commands.add_parser("part", help="work on one part without a limit of time")
     one.add_argument("name", choices=PARTS)
     for command in (running, one):
@@ -268,6 +276,7 @@ def parser() -> argparse.ArgumentParser:
         command.add_argument("--out", type=Path, required=True)
         command.add_argument("--device", default="auto")
         command.add_argument("--commit", default="", help="of this checkout, where git cannot tell it")
+        command.add_argument("--jobs", type=int, help="processes that train at once, by default as `rates` advises")
         command.add_argument("--smoke", action="store_true", help="the least of everything, to try the script itself")
     return top
 
@@ -278,8 +287,7 @@ def main() -> int:
     if chosen.command == "pack":
         pack(chosen)
     elif chosen.command == "part":
-        place = Place(chosen.name, chosen.data, chosen.out, chosen.device, chosen.commit, chosen.smoke)
-        PARTS[chosen.name](place)
+        CHECKS.get(chosen.name, check_preset)(place_of(chosen, chosen.name))
     else:
         return 0 if run_parts(chosen) else 1
     return 0

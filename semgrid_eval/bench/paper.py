@@ -1,4 +1,4 @@
-"""The paper at its own scale: rows in the order that matters, the scores of those that are done, and what all cost."""
+"""What runs on grids without logs: the paper at its own scale, presets, scores of what is done, and what all cost."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from semgrid_eval.config import parse_config
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.network import TrainingConfig
 from semgrid_eval.report.claims.claims import in_paper
 from semgrid_eval.report.estimates.bootstrap import Estimate, Resampling, RowScores, score_regions
@@ -49,18 +50,32 @@ def paper_matrix(*, smoke: bool = False) -> Matrix:
     paper, scaled = load_matrix("paper"), load_matrix("paper-cpu")
     rows = {row.name: row for row in (*scaled.rows, *paper.rows) if row in paper.rows or row.facts.baseline}
     names = [name for name in ORDER if name in rows][: 3 if smoke else None]
-    sized = tuple(_sized(rows[name], smoke=smoke) for name in names)
+    size = _SMOKE if smoke else TrainingConfig().model_dump(include=set(_SMOKE))
+    once = (rows[name].model_copy(update={"repeats": 1}) for name in names)
+    sized = tuple(_sized(row, size, smoke=smoke) for row in once)
     return Matrix(title=paper.title, seed=paper.seed, rows=sized)
 
 
-def _sized(row: Row, *, smoke: bool) -> Row:
-    """Train a network as long as the paper does, once; grids that are carried along have no second target."""
+def matrix_of_grids(preset: str, *, smoke: bool = False) -> Matrix:
+    """Return the rows of a preset for which grids alone suffice, of the default configuration, without second targets.
+
+    `smoke` keeps the first row of each model, as small and trained as little as can be.
+    """
+    matrix = load_matrix(preset)
+    rows = [row for row in matrix.rows if row.grid == GridConfig() and row.asked is None]
+    if smoke:
+        rows = list({row.model: row for row in reversed(rows)}.values())
+    size = _SMOKE if smoke else {}
+    return Matrix(title=matrix.title, seed=matrix.seed, rows=tuple(_sized(row, size, smoke=smoke) for row in rows))
+
+
+def _sized(row: Row, size: Mapping[str, int], *, smoke: bool) -> Row:
+    """Change how long a network is trained; grids that are carried along have no second target."""
     settings = dict(row.settings)
     if "training" in settings:
-        size = _SMOKE if smoke else TrainingConfig().model_dump(include=set(_SMOKE))
         settings["training"] = settings["training"] | size
         settings |= {"features": 2} if smoke and "features" in settings else {}
-    return parse_config(Row, row.model_dump(mode="json") | {"settings": settings, "repeats": 1, "second_target": None})
+    return parse_config(Row, row.model_dump(mode="json") | {"settings": settings, "second_target": None})
 
 
 def scores_of(folder: Path, reference: Path) -> dict[str, dict[str, object]]:

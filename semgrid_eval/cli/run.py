@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
     from semgrid_eval.scores.results import RunRecord
 
 _TRAININGS = "Trained networks (default: OUT/trainings); those of another run are used where they fit."
+_ANY_MACHINE = "Take trainings of other machines, too: of a GPU, in another precision, with other threads."
 _MODEL = "One more row: a model of your own, path.py:Class, or an installed one."
 
 
@@ -37,6 +38,7 @@ _MODEL = "One more row: a model of your own, path.py:Class, or an installed one.
 @click.option("--grids", type=FOLDER, help="Grid cache (default: OUT/grids).")
 @click.option("--validation-logs", type=THERE, help="Folder of the logs to score, where they are not in --logs.")
 @click.option("--trainings", type=FOLDER_THERE, help=_TRAININGS)
+@click.option("--any-machine", is_flag=True, help=_ANY_MACHINE)
 @click.option("--model", "models", multiple=True, help=_MODEL)
 @click.option("--row", "only", multiple=True, help="Only this row, or rows like 'BL-*'; may be repeated.")
 @device_option
@@ -69,6 +71,7 @@ def command(
     memory_limit: float | None,
     gpus: float,
     *,
+    any_machine: bool,
     pictures: bool,
     dry_run: bool,
 ) -> int:
@@ -102,7 +105,7 @@ def command(
         grids_on = local_executor(workers) if address == LOCAL else chosen_executor(executor, address, workers)
         kept = grids or out / "grids"
         options = RunOptions(
-            device, kept, command_line(), only, rows_on, grids_on, pictures, validation_logs, trainings
+            device, kept, command_line(), only, rows_on, grids_on, pictures, validation_logs, trainings, any_machine
         )
         work = _show_plan if dry_run else _run
         code = work(resolved, logs, out, options)

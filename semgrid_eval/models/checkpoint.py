@@ -6,6 +6,7 @@ import json
 import logging
 import pickle
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +14,7 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load, save
 
-from semgrid_eval.errors import DamageError, InputError
+from semgrid_eval.errors import DamageError, InputError, ResultError
 from semgrid_eval.models.network import Network
 from semgrid_eval.seals import open_seal, read_sealed, write_sealed
 
@@ -103,6 +104,16 @@ class TrainingFolder:
         read_header(self._weights, owner=self._key)
         read_history(self._history, owner=self._key)
         return True
+
+
+def find_finished(trainings: Path, key: str) -> Path | None:
+    """Find the folder of a finished training by its key, whoever has trained it, and whatever the folder's name."""
+    for folder in sorted(trainings.iterdir()) if trainings.is_dir() else ():
+        with suppress(ResultError):
+            read_history(folder / HISTORY_FILE, owner=key)
+            read_header(folder / WEIGHTS_FILE, owner=key)
+            return folder
+    return None
 
 
 def save_weights(

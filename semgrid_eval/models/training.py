@@ -10,11 +10,13 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from semgrid_eval.config import Config
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.files import digest_value, locked
 from semgrid_eval.models.augment import augment
 from semgrid_eval.models.checkpoint import EpochRecord, TrainingFolder
 from semgrid_eval.models.device import seeded
+from semgrid_eval.models.model import Given
 from semgrid_eval.models.network import Network, autocast
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.windows.data import WindowBatch, WindowSet
@@ -56,14 +58,8 @@ def train(
         DivergedError: the loss became NaN or infinite.
     """
     network.to(device)
-    key = {
-        "network": [type(network).__name__, network.version, network.settings.model_dump(mode="json")],
-        "given": network.given.described(),
-        "seed": seed,
-        "windows": windows.digest(),
-        "validation": validation.digest() if validation else None,
-    }
-    store = TrainingFolder(folder, digest_value(key))
+    key = training_key(type(network), network.settings, network.given, seed, windows, validation)
+    store = TrainingFolder(folder, key)
     # Whoever else trains the same waits, and then finds it complete; what is complete need not be writable.
     with nullcontext() if store.is_complete() else locked(folder):
         if store.is_complete():
@@ -72,6 +68,21 @@ def train(
             trainer = _Trainer(network, windows.to(device), seed, device)
             history = trainer.run(store, validation.to(device) if validation else None, progress)
     return Trained(network.eval(), tuple(history), sum(row.seconds for row in history))
+
+
+def training_key(
+    made: type[Network], settings: Config, given: Given, seed: int, windows: WindowSet, validation: WindowSet | None
+) -> str:
+    """Digest what decides a training but for where it is done: device, precision and threads."""
+    return digest_value(
+        {
+            "network": [made.__name__, made.version, settings.model_dump(mode="json")],
+            "given": given.described(),
+            "seed": seed,
+            "windows": windows.digest(),
+            "validation": validation.digest() if validation else None,
+        }
+    )
 
 
 def draw_windows(count: int, needed: int, generator: torch.Generator) -> Tensor:

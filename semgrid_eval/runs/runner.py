@@ -44,9 +44,10 @@ class RunOptions:
     grid_executor: Executor = field(default_factory=InProcess)  # where grids are built and pictures made small
     pictures: bool = True  # whether to keep small pictures of the windows' frames for the report
     validation_logs: Path | None = None  # folder of the logs to score, where they are not among those to train on
-    trainings: Path | None = (
-        None  # their folder, the run's own if not given; what another run has trained is found there
-    )
+    # Folder of trainings, the run's own if not given; what another run has trained is found there.
+    trainings: Path | None = None
+    # Whether networks will do that were trained on another device, in another precision or with other threads.
+    any_machine: bool = False
 
 
 def run_matrix(
@@ -173,6 +174,7 @@ def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stag
         threads=options.executor.threads or torch.get_num_threads(),
         example_seed=matrix.seed,
         stage=stage,
+        any_machine=options.any_machine,
     )
 
 
@@ -191,6 +193,7 @@ def _unit_work(
         command="",
         validation_logs=options.validation_logs and options.validation_logs.resolve(),
         trainings=options.trainings and options.trainings.resolve(),
+        any_machine=options.any_machine,
     )
     place = (matrix.model_dump_json(), logs.resolve(), out.resolve(), there, options.executor.threads)
     with worker.stage("rows") as progress:

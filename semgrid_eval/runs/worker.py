@@ -16,13 +16,14 @@ from semgrid_eval.files import atomic_folder, digest_value
 from semgrid_eval.grids.recording import FORMAT_VERSION as GRIDS
 from semgrid_eval.grids.truth import Question, truth_versions
 from semgrid_eval.models.checkpoint import HISTORY_FILE as TRAINING_HISTORY_FILE
-from semgrid_eval.models.checkpoint import read_history, write_history
+from semgrid_eval.models.checkpoint import WEIGHTS_FILE, find_finished, read_history, write_history
 from semgrid_eval.models.device import choose_precision, seeded
 from semgrid_eval.models.fitting import Fitted, Lesson
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.network import Network, NetworkSettings
 from semgrid_eval.models.registry import MODELS, described, version_of
 from semgrid_eval.models.stand_in import make_ready
+from semgrid_eval.models.training import training_key
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.data import GridSource, grid_digest
 from semgrid_eval.runs.job import Job, Resolved, Training, id_of_result, id_of_windows, target_key, window_records
@@ -59,6 +60,7 @@ class Worker:
     threads: int  # of numeric libraries where the units are worked on, which may be another process
     example_seed: int  # of the results whose predictions are kept for a report's examples
     stage: Stage  # shows progress
+    any_machine: bool = False  # whether what was trained on another device or with other threads will do
     _windows: Selection = field(default_factory=Selection, init=False)
     _unseen: tuple[tuple[GridData, bytes], Unseen] | None = field(default=None, init=False)  # M of the last stream
     _recorded: RecordedRows = field(default_factory=RecordedRows, init=False)
@@ -221,7 +223,11 @@ class Worker:
                 "grids": [GRIDS, grid_digest(row.grid), list(row.grid.classes.names)],
             }
         )
-        return Training(training_id, self.trainings / training_id, windows, watched)
+        folder = self.trainings / training_id
+        if self.any_machine and issubclass(resolved.model, Network) and not (folder / WEIGHTS_FILE).is_file():
+            key = training_key(resolved.model, settings, row.given, seed or 0, windows, watched)
+            folder = find_finished(self.trainings, key) or folder
+        return Training(folder.name, folder, windows, watched)
 
     def fitted(self, job: Job) -> Fitted:
         """Make the job's model ready to predict."""

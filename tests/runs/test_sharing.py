@@ -3,6 +3,7 @@
 import errno
 import shutil
 import time
+from dataclasses import replace
 from threading import Thread
 
 import pytest
@@ -145,3 +146,30 @@ def test_one_at_a_time_works_under_a_lock(tmp_path):
     for thread in threads:
         thread.join()
     assert seen == ["begun", "done"] * 3
+
+
+def test_networks_of_other_machines_are_taken_where_that_is_asked_for(work, logs, monkeypatch):
+    work([ED])
+    trained = work.out / "trainings"
+    monkeypatch.setattr("semgrid_eval.runs.worker.choose_precision", lambda *_: torch.bfloat16)  # another machine's
+    matrix = load_matrix(str(work.out.parent / "matrix.yaml"))
+    options = replace(work.options, trainings=trained, any_machine=True)
+    before = sorted(trained.iterdir())
+    taken = run_matrix(matrix, logs, work.out.parent / "taken", options)
+    assert failures(taken) == {"ED": None}
+    assert sorted(trained.iterdir()) == before
+    assert [row.results for row in taken.rows] == [row.results for row in results.read_run(work.out).rows]
+    run_matrix(matrix, logs, work.out.parent / "anew", replace(options, any_machine=False))
+    assert len(list(trained.iterdir())) == len(before) + 1
+
+
+def test_a_training_that_is_not_finished_is_nobody_elses(work, logs, monkeypatch):
+    work([ED])
+    trained = work.out / "trainings"
+    (weights,) = trained.glob("*/weights.safetensors")
+    weights.unlink()
+    monkeypatch.setattr("semgrid_eval.runs.worker.choose_precision", lambda *_: torch.bfloat16)
+    options = replace(work.options, trainings=trained, any_machine=True)
+    run_matrix(load_matrix(str(work.out.parent / "matrix.yaml")), logs, work.out.parent / "taken", options)
+    assert len(list(trained.glob("*/weights.safetensors"))) == 1
+    assert len(list(trained.iterdir())) == 2

@@ -12,10 +12,14 @@ import numpy as np
 import pytest
 from support.recordings import random_recording
 
+from semgrid_eval.bench.archives import pack_run
+from semgrid_eval.bench.paper import matrix_of_grids
 from semgrid_eval.files import write_json
 from semgrid_eval.grids.recording import write_recordings
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.runs.packed import PackedIndex, write_index
+from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores.results import LogRecord
 
 TOOL = Path(__file__).parents[2] / "tools" / "gpu_check.py"
@@ -46,9 +50,9 @@ def tool():
     return module
 
 
-def check(carried, out, *parts):
+def check(carried, out, *parts, options=()):
     """Run parts on the CPU; return the exit code and what is printed."""
-    options = ["--data", carried, "--out", out, "--device", "cpu", "--commit", "abc", "--smoke"]
+    options = ["--data", carried, "--out", out, "--device", "cpu", "--commit", "abc", "--smoke", *options]
     command = [sys.executable, TOOL, "run", *options, *(word for part in parts for word in ("--part", part))]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     return done.returncode, done.stdout + done.stderr
@@ -60,7 +64,7 @@ def figures(out, part):
 
 @pytest.mark.slow
 def test_rates_then_rows_are_measured_scored_and_priced(carried, tmp_path):
-    earlier = tmp_path / "out-work" / "run" / "trainings" / "0"
+    earlier = tmp_path / "out-work" / "paper" / "run" / "trainings" / "0"
     earlier.mkdir(parents=True)
     code, printed = check(carried, tmp_path / "out", "rates:300", "paper:300")
     assert code == 0, printed
@@ -84,8 +88,41 @@ def test_rates_then_rows_are_measured_scored_and_priced(carried, tmp_path):
     assert "the paper's own rows, estimated" in printed
     with tarfile.open(tmp_path / "out" / "paper-run.tar.gz") as archive:
         assert "run/run.json" in archive.getnames()
-    assert (tmp_path / "out" / "EncoderDecoder.safetensors").is_file()
-    assert len(list((tmp_path / "out").iterdir())) <= 8
+
+
+@pytest.mark.slow
+def test_a_preset_is_trained_on_grids_alone_and_what_it_trained_is_found_where_the_rest_is(carried, tmp_path):
+    code, printed = check(carried, tmp_path / "out", "reference:300", options=["--weights", "reference", "--jobs", "2"])
+    assert code == 0, printed
+    found = figures(tmp_path / "out", "reference")
+    assert found["complete"]
+    assert found["processes"] == 2
+    assert set(found["rows"]) == {"BL-DC", "ED-DC", "BL-Sp1", "RN-DC", "BL-Fuse", "BL-Table", "BL-Flow"}
+    for name in ("reference-run.tar.gz", "reference-weights-0.tar.gz"):
+        with tarfile.open(tmp_path / "out" / name) as archive:
+            archive.extractall(tmp_path / "back", filter="data")
+    options = RunOptions("cpu", tmp_path / "grids", "here", trainings=tmp_path / "back/run/trainings", any_machine=True)
+    run_matrix(matrix_of_grids("reference", smoke=True), carried / "grids", tmp_path / "again", options)
+    assert len(list(tmp_path.glob("back/run/trainings/*/weights.safetensors"))) == 2
+    assert not list(tmp_path.glob("again/trainings/*"))
+    (back,), (again,) = (load_runs([folder]) for folder in (tmp_path / "back" / "run", tmp_path / "again"))
+    ids = [{row.name: row.results[0].record.id for row in run.rows if "-DC" in row.name} for run in (back, again)]
+    assert ids[0] == ids[1]
+
+
+def test_archives_of_a_run_stay_below_what_comes_through(tmp_path, monkeypatch):
+    for number, size in enumerate((40, 70, 20, 200)):
+        training = tmp_path / "run" / "trainings" / str(number)
+        training.mkdir(parents=True)
+        (training / "weights.safetensors").write_bytes(bytes(size))
+    (tmp_path / "run" / "trainings" / "unfinished").mkdir()
+    monkeypatch.setattr("semgrid_eval.bench.archives.LARGEST_BYTES", 100)
+    pack_run(tmp_path / "run", tmp_path / "some", weights=True)
+    packed = []
+    for path in sorted(tmp_path.glob("some-weights-*")):
+        with tarfile.open(path) as archive:
+            packed.append([name for name in archive.getnames() if name.count("/") == 2])
+    assert packed == [["run/trainings/0"], ["run/trainings/1", "run/trainings/2"], ["run/trainings/3"]]
 
 
 def test_parts_that_fail_or_take_too_long_are_told_and_the_next_begins(tmp_path):
