@@ -70,15 +70,21 @@ def _like_for_like(scores: Scores, found: Headline) -> Markup:
     best = scores[found.best.name]
     several = found.compared < found.sharing
     asked = f"Like for like ({question_words(found.best, found.best)}; {plural(found.compared, 'row')}), " * several
-    start = _say(
-        "{}{} has the highest mean IoU of known classes, {}", asked, _name(found.best), number(best.mean[HEADLINE])
-    )
-    if found.rival is None:
+    value = number(best.mean[HEADLINE])
+    start = _say("{}{} has the highest mean IoU of known classes, {}", asked, _name(found.best), value)
+    if found.rival is None or found.next_best is None:
         alone = "no other row is asked the same" if several else "there is no other row to compare with"
         return start + _say(" ({}); {}.", interval_phrase(best.estimate(HEADLINE)), alone)
-    lead = best.minus(scores[found.rival.name], HEADLINE)
-    over = f"{found.rival.name}, {_kind(found.best, found.rival)}"
-    return start + _say(": {} over {}, {}.", signed(lead.value), over, _verdict(lead))
+    behind = [found.next_best] if found.next_best == found.rival else [found.next_best, found.rival]
+    over = (_over(best.minus(scores[row.name], HEADLINE), row, _kind(found, row)) for row in behind)
+    return start + _say(": {}.", ", and ".join(over))
+
+
+def _over(lead: Estimate, row: Row, kind: str) -> str:
+    """Say how far a row is behind; what rounds to nothing is no lead."""
+    if round(lead.value, 3) == 0:
+        return f"as high as {row.name}, {kind} ({interval_phrase(lead, with_sign=True)})"
+    return f"{signed(lead.value)} over {row.name}, {kind}, {_verdict(lead)}"
 
 
 def _of_all(scores: Scores, found: Headline) -> Markup | str:
@@ -163,10 +169,10 @@ def _tile(label: str, difference: Estimate, reach: float, behind: str) -> Tile:
     return Tile(label, value, note or "no interval", tone, word, title, *places)
 
 
-def _kind(best: Row, rival: Row) -> str:
-    if best.is_baseline == rival.is_baseline:
-        return "the runner-up"
-    return "the best baseline" if rival.is_baseline else "the best model that is not a baseline"
+def _kind(found: Headline, row: Row) -> str:
+    if found.best.is_baseline == row.is_baseline:
+        return "the next best"
+    return "the best baseline" if row.is_baseline else "the best model that is not a baseline"
 
 
 def title_of(runs: Sequence[Run]) -> str:

@@ -23,7 +23,8 @@ class Headline:
     best: Row
     overall: Row  # the best of the rows with the same targets, whatever else they are asked
     sharing: int  # how many these are
-    rival: Row | None  # the best row of the other kind (baseline or not), else the runner-up
+    next_best: Row | None  # the second best row of the main group
+    rival: Row | None  # the best row there of the other kind (baseline or not), else the next best
     reference: Row | None  # the baseline of the best row
 
 
@@ -98,10 +99,12 @@ def headline(scores: Scores) -> Headline | None:
         return scores[row.name].mean[HEADLINE]
 
     best = max(group, key=mean)
+    next_best = max((row for row in group if row != best), key=mean, default=None)
     others = [row for row in group if row.is_baseline != best.is_baseline]
-    rival = max(others or [row for row in group if row != best], key=mean, default=None)
+    rival = max(others, key=mean, default=next_best)
     sharing = [row for row in rows if comparable(row, best) and row.disturbed == best.disturbed]
-    return Headline(len(group), best, max(sharing, key=mean), len(sharing), rival, reference_of(best, rows))
+    overall = max(sharing, key=mean)
+    return Headline(len(group), best, overall, len(sharing), next_best, rival, reference_of(best, rows))
 
 
 def shared_windows(row: Row, other: Row) -> int:

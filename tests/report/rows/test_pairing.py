@@ -122,6 +122,28 @@ def test_what_is_nowhere_is_not_compared():
     assert words["Vehicles"] == ("\N{EN DASH}", "absent")
 
 
+def test_the_next_best_row_is_named_beside_the_best_of_the_other_kind():
+    hits = {"BL-DC": 50, "BL-Fuse": 60, "BL-Flow": 59, "ED-DC": 30}
+    rows = [counted_row(name, {"road": [number] * 12}) for name, number in hits.items()]
+    scores = score_rows(rows, np.random.default_rng(0))
+    (sentence, *_), compared = _said(rows, scores)
+    first, second = sentence.split(", and ")
+    assert "+0.010 over BL-Flow, the next best, clearly better" in first
+    assert second.startswith("+0.300 over ED-DC, the best model that is not a baseline, clearly better")
+    assert compared == "BL-Fuse \N{MINUS SIGN} ED-DC"
+
+
+def test_a_lead_that_rounds_to_nothing_is_none():
+    rows = [counted_row(name, {"road": [60] * 12}) for name in ("BL-Fuse", "BL-Flow")]
+    scores = score_rows(rows, np.random.default_rng(0))
+    assert ": as high as BL-Flow, the next best (95% interval 0.000 to 0.000)." in _said(rows, scores)[0][0]
+
+
+def _said(rows, scores):
+    summary = summarise([Run(Path(), "", None, tuple(rows))], scores, headline(scores))
+    return summary.sentences, summary.compared
+
+
 def test_a_difference_without_interval_may_be_chance():
     rows = [counted_row(name, {"road": [hits]}) for name, hits in (("BL-DC", 50), ("ED-DC", 60))]
     scores = score_rows(rows, np.random.default_rng(0))
