@@ -102,7 +102,8 @@ def sentence(findings: Sequence[Finding]) -> str:
     one = {Verdict.HOLDS: "holds", Verdict.FAILS: "does not", Verdict.OPEN: "is undecided"}
     many = {Verdict.HOLDS: "hold", Verdict.FAILS: "do not", Verdict.OPEN: "are undecided"}
     parts = ", ".join(f"{count[kind]} {(one if count[kind] == 1 else many)[kind]}" for kind in one)
-    return f"Of {plural(len(findings), 'claim')}, {tested} can be tested here: {parts}."
+    listed = plural(len(findings), "claim")
+    return f"Of {listed}, the paper's and ours about stronger baselines, {tested} can be tested here: {parts}."
 
 
 def finding_table(name: str, findings: Sequence[Finding]) -> Table:

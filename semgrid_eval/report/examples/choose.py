@@ -78,7 +78,8 @@ def choose(contest: Contest, *, best: int, worst: int) -> list[Pick]:
     order = _ordered(values)
     top = _of_other_recordings(contest.result, order, best)
     left = _of_other_recordings(contest.result, order[~np.isin(order, top)][::-1], worst)
-    picks = [(i, "Largest over all classes") for i in top] + [(i, "Smallest over all classes") for i in left]
+    what = "difference over all classes" if contest.rivals else "score over all classes"
+    picks = [(i, f"Largest {what}") for i in top] + [(i, f"Smallest {what}") for i in left]
     return [Pick(i, reason, float(values[i])) for i, reason in picks]
 
 

@@ -61,6 +61,11 @@ class Chart:
     has_paper: bool
 
     @property
+    def has_told(self) -> bool:
+        """Whether a row is told more than any model could know."""
+        return any(entry.told for _, entries in self.groups for entry in entries)
+
+    @property
     def name_characters(self) -> int:
         """The room that names need."""
         return max((len(entry.name) for _, entries in self.groups for entry in entries), default=0)
