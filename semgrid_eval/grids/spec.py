@@ -45,6 +45,11 @@ class GridSpec(Config):
         left_m = (self.agent_column - np.arange(self.columns, dtype=np.float64) - 0.5) * self.cell_m
         return forward_m, left_m
 
+    def ranges_m(self) -> NDArray[np.float64]:
+        """Return how far the cells' centres are from the vehicle: (H, W)."""
+        forward_m, left_m = self.centres_m()
+        return np.asarray(np.hypot(forward_m[:, None], left_m))
+
 
 def paper_sensors() -> dict[str, SensorConfig]:
     """Return the whole image and the sensors of Split 1 and Split 2 (supplement; reading 19), of 512 x 256 px."""

@@ -22,6 +22,7 @@ from semgrid_eval.progress import Stage
 from semgrid_eval.recording.colour import decode_colour
 from semgrid_eval.recording.panorama import panorama_png
 from semgrid_eval.recording.png import decode_ids, encode_gray, read_header, with_palette
+from semgrid_eval.recording.resizing import nearest
 from semgrid_eval.scores.thumbnails import (
     FramePictures,
     LogPictures,
@@ -30,7 +31,7 @@ from semgrid_eval.scores.thumbnails import (
     read_pictures,
     write_pictures,
 )
-from semgrid_eval.sensors.projection import nearest_indices, unit_projection
+from semgrid_eval.sensors.projection import unit_projection
 
 if TYPE_CHECKING:  # processes that only shrink pictures need no torch
     from semgrid_eval.windows.data import WindowSet
@@ -156,8 +157,7 @@ def small_image(file: bytes) -> bytes:
 def small_label(png: bytes) -> bytes:
     """Turn a label image, a PNG file of label ids, into a small one with their colours; errors as `small_image`."""
     ids = decode_ids(png)
-    height, width = _small_size(*ids.shape)
-    small = ids[nearest_indices(ids.shape[0], height)[:, None], nearest_indices(ids.shape[1], width)[None, :]]
+    small = nearest(ids, _small_size(*ids.shape)[::-1])
     return with_palette(encode_gray(small), label_palette()[: int(small.max()) + 1])
 
 
