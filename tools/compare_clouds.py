@@ -142,8 +142,7 @@ def _grids(log: Path, config: GridConfig) -> Cells:
 
 
 def _between(low_m: float, high_m: float) -> NDArray[np.bool_]:
-    forward_m, left_m = GridConfig().spec.centres_m()
-    range_m = np.hypot(forward_m[:, None], left_m)
+    range_m = LIDAR.spec.ranges_m()
     return np.asarray((range_m >= low_m) & (range_m < high_m))
 
 

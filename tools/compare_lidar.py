@@ -131,8 +131,7 @@ def _steadiness(recording: GridRecording, place_m: NDArray[np.float64]) -> tuple
 
 
 def _between(low_m: float, high_m: float) -> Flags:
-    forward_m, left_m = LIDAR.spec.centres_m()
-    range_m = np.hypot(forward_m[:, None], left_m)
+    range_m = LIDAR.spec.ranges_m()
     return np.asarray((range_m >= low_m) & (range_m < high_m))
 
 

@@ -208,8 +208,7 @@ def _measure_grids(logs: list[Path], count: int) -> NDArray[np.int64]:
     """Count cells (ranges, newer class, older class there) but those that are known in the older grid alone."""
     config = GridConfig(sensors={"full": CameraSensor()})
     spec = config.spec
-    rows, columns = np.indices((spec.rows, spec.columns))
-    range_m = np.hypot((spec.agent_row - rows - 0.5) * spec.cell_m, (spec.agent_column - columns - 0.5) * spec.cell_m)
+    range_m = spec.ranges_m()
     total = np.zeros((len(RANGES_M), CLASS_COUNT, CLASS_COUNT), np.int64)
     for log in logs:
         for recording in build_log(log, config):

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import CLASS_COUNT, DEFAULT_CLASSES, NO_POINT
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.spec import GridSpec
+from semgrid_eval.recording.resizing import nearest
 from semgrid_eval.recording.types import CameraCalibration
-from semgrid_eval.sensors.projection import ground_slope, nearest_indices
+from semgrid_eval.sensors.projection import ground_slope
 
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 Grid = NDArray[np.uint8]
@@ -40,7 +41,7 @@ def grid_by_arrays(disparity: Image, label: Image, view: View, grid_from_vehicle
     """
     camera = view.calibration
     slope = ground_slope(camera, (disparity.shape[1], disparity.shape[0]), view.size_px)
-    disparity, label = (_resized(image, view.size_px) for image in (disparity, label))
+    disparity, label = (nearest(image, view.size_px) for image in (disparity, label))
     class_id = np.where(disparity > 1, view.class_by_label[label], NO_POINT)
     used = class_id != NO_POINT
     depth_m = camera.fx_px * camera.baseline_m * 256.0 / (disparity[used] - 1.0)
@@ -50,11 +51,6 @@ def grid_by_arrays(disparity: Image, label: Image, view: View, grid_from_vehicle
         counts > 0, DEFAULT_CLASSES.priorities()[:, None, None].astype(np.int64) * 2 * counts.max() + counts, 0
     )
     return np.asarray(rank.argmax(axis=0), np.uint8)
-
-
-def _resized(image: Image, size_px: tuple[int, int]) -> Image:
-    (height, width), (columns, rows) = image.shape, size_px
-    return image[nearest_indices(height, rows)[:, None], nearest_indices(width, columns)]
 
 
 def _counted(place_m: NDArray[np.float64], class_id: Grid, move: SE2, spec: GridSpec) -> NDArray[np.int64]:

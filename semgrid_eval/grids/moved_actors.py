@@ -15,10 +15,10 @@ from semgrid_eval.grids.truth import FrameLog, WindowTimes
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.motion import EgoMotion
 from semgrid_eval.recording.png import decode_gray
+from semgrid_eval.recording.resizing import nearest_indices
 from semgrid_eval.recording.types import Actor, CameraFrame
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sensors.kinds import read_points
-from semgrid_eval.sensors.projection import nearest_indices
 from semgrid_eval.sensors.sensor import Points
 
 Ids = NDArray[np.int64]

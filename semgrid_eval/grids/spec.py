@@ -13,6 +13,7 @@ from semgrid_eval.labels import LABEL_ID
 from semgrid_eval.motion import Integrator
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sensors.kinds import Sensor, SensorName
+from semgrid_eval.sensors.lidar import LidarSensor
 from semgrid_eval.sensors.sensor import Morphology, SensorConfig
 
 STANDING, MOVING = 1, 2  # bits of the flags that say whose footprint a cell lies in
@@ -43,6 +44,11 @@ class GridSpec(Config):
         forward_m = (self.agent_row - np.arange(self.rows, dtype=np.float64) - 0.5) * self.cell_m
         left_m = (self.agent_column - np.arange(self.columns, dtype=np.float64) - 0.5) * self.cell_m
         return forward_m, left_m
+
+    def ranges_m(self) -> NDArray[np.float64]:
+        """Return how far the cells' centres are from the vehicle: (H, W)."""
+        forward_m, left_m = self.centres_m()
+        return np.asarray(np.hypot(forward_m[:, None], left_m))
 
 
 def paper_sensors() -> dict[str, SensorConfig]:
@@ -100,10 +106,20 @@ class GridConfig(Config):
         return {**{name: (name,) for name in self.sensors}, self.target_row: self.target}
 
     @property
+    def leader(self) -> SensorConfig:
+        """The sensor that leads the target: its times are the grids'."""
+        return self.sensors[self.target[0]]
+
+    @property
     def camera(self) -> CameraSensor | None:
         """The part of a camera's image that leads the target; None where a sensor of another kind does."""
-        first = self.sensors[self.target[0]]
-        return first if isinstance(first, CameraSensor) else None
+        return self.leader if isinstance(self.leader, CameraSensor) else None
+
+    @property
+    def camera_beside(self) -> str | None:
+        """The first camera that the target, then any sensor, names; where no camera leads it is the one to show."""
+        named = (_camera_of(self.sensors[name]) for name in (*self.target, *self.sensors))
+        return next((camera for camera in named if camera is not None), None)
 
     def morphology_of(self, sensor: str) -> Morphology:
         """What is done to the cells of a sensor: its own choice, or the grid's."""
@@ -126,3 +142,10 @@ class GridConfig(Config):
         for label, name in self.class_map.items():
             table[LABEL_ID[label]] = NO_POINT if name is None else self.classes.names.index(name)
         return table
+
+
+def _camera_of(sensor: SensorConfig) -> str | None:
+    """Return the name of the camera that a sensor is a part of, or is coloured by."""
+    if isinstance(sensor, CameraSensor):
+        return sensor.camera
+    return sensor.colour_from.camera if isinstance(sensor, LidarSensor) and sensor.colour_from else None

@@ -19,7 +19,6 @@ from semgrid_eval.recording.types import Quantity
 _NEEDED = (topics.DISPARITY, topics.CALIBRATION, topics.STEREO)
 """Channels of a camera without which its pictures cannot be looked at."""
 _TRUTH = {topics.TRUE_POSE, topics.TRUE_ACTORS}
-_HINTS = {"label_id": "; are they train ids?"}
 
 
 def check_log(path: Path, contract: Contract | None = None) -> LogReport:
@@ -120,7 +119,7 @@ def _values(contract: Contract, extents: Extents, cameras: tuple[str, ...]) -> I
                 if extent is None:
                     continue
                 worst = extent.high if limit.holds(extent.low) else extent.low
-                yield from judged(limit, f"{topic}: {quantity}", worst, f"is {worst:g}{_HINTS.get(quantity, '')}")
+                yield from judged(limit, f"{topic}: {quantity}", worst, f"is {worst:g}")
     ids = [
         extents[topic]["label_id"].high
         for camera in cameras

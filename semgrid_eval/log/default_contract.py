@@ -40,7 +40,6 @@ _MOUNTING = {
     "roll_rad": Range(low=-0.5, high=0.5),
     "pitch_rad": Range(low=-0.5, high=0.5),
 }
-_LAST_LABEL_ID = max(label.label_id for label in CITYSCAPES_LABELS)
 _LAST_TRAIN_ID = max(label.train_id for label in CITYSCAPES_LABELS if label.train_id != 255)
 
 
@@ -49,7 +48,6 @@ def default_contract() -> Contract:
     """Return what is expected of any recording."""
     motion = {"type": "semgrid.v1.Egomotion", "uncovered_s": _WITH_DISPARITY, "values": _MOTION}
     disparity = {"type": _PICTURE, "values": {"valid_share": Range(low=0.02)}}
-    ids = {"label_id": Range(low=0, high=_LAST_LABEL_ID)}
     return Contract(
         checksums=Severity.WARNING,
         sensors=_NEEDED,
@@ -57,7 +55,7 @@ def default_contract() -> Contract:
         topics={
             topics.EGO_MOTION: _STEADY.model_copy(update=motion),
             _DISPARITY: _STEADY.model_copy(update=disparity),
-            _LABEL: TopicContract(type=_PICTURE, missing_beside=_WITH_DISPARITY, values=ids),
+            _LABEL: TopicContract(type=_PICTURE, missing_beside=_WITH_DISPARITY),
             _IMAGE: TopicContract(type=_PICTURE, missing_beside=_WITH_DISPARITY),
             _CALIBRATION: TopicContract(type="foxglove.CameraCalibration", messages=_NEEDED, values=_OPTICS),
             _STEREO: TopicContract(type="semgrid.v1.StereoCalibration", messages=_NEEDED, values=_MOUNTING),

@@ -23,6 +23,8 @@ _CAMERA_TOPIC = re.compile(r"/camera/[^/]+/(.+)")
 _MOTION = ("speed_mps", "yaw_rate_radps", "latitude_deg", "longitude_deg", "heading_deg")
 _MOUNTING = ("baseline_m", "x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad")
 _OPTICS = ("fx_px / width", "fy_px / fx_px", "u0_px / width", "v0_px / height", "fx_px", "fy_px", "u0_px", "v0_px")
+_VOID_ID = 255
+"""Of pixels without a label in images of train ids; it is not one, so it does not count."""
 _SWEEP = ("points", "range_m", "label_id")
 _OF_CHANNELS = {
     topics.CALIBRATION: _OPTICS,
@@ -128,7 +130,8 @@ def _frame_values(frame: CameraFrame) -> Iterator[tuple[str, str, Extent]]:
     yield topics.DISPARITY, "valid_share", _one(share)
     if frame.label_png is not None:
         ids = decode_gray(frame.label_png, bit_depth=8)
-        yield topics.LABEL, "label_id", Extent(int(np.min(ids)), int(np.max(ids)))
+        labelled = np.where(ids == _VOID_ID, 0, ids)
+        yield topics.LABEL, "label_id", Extent(int(np.min(labelled)), int(np.max(labelled)))
 
 
 def _require_size(frame: CameraFrame, size: tuple[int, int] | None) -> tuple[int, int]:

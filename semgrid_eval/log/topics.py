@@ -67,6 +67,11 @@ def lidar_topic(lidar: str) -> str:
     return f"/lidar/{lidar}/points"
 
 
+def lidar_picture_topic(lidar: str) -> str:
+    """Return the topic of what a LiDAR saw all around, as a picture; a played run has it."""
+    return f"/lidar/{lidar}/label"
+
+
 def lidar_of(topic: str) -> str | None:
     """Return the name of the LiDAR whose sweeps a topic holds; None where it holds none."""
     found = re.fullmatch(r"/lidar/([^/]+)/points", topic)

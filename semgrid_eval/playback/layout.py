@@ -27,15 +27,18 @@ _CAMERA_STATE = {
 }
 
 
-def viewer_layout(rows: Sequence[bool], cameras: Sequence[str], *, inputs: bool = True) -> dict[str, Any]:
-    """Lay out panels of grids for the rows of a log, and beside them pictures of the first camera and the legend.
+def viewer_layout(
+    rows: Sequence[bool], camera: str | None, lidar: str | None = None, *, inputs: bool = True
+) -> dict[str, Any]:
+    """Lay out panels of grids for the rows of a log, and beside them what a sensor saw, and the legend.
 
     Args:
         rows: for each row whether it says how sure it is.
-        cameras: of the log; without one there is the legend alone.
+        camera: the one whose pictures are shown, if one's are.
+        lidar: the one whose pictures are shown, if one's are.
         inputs: whether the log has them.
     """
-    pictures, grids = _pictures(cameras), _grids(rows, inputs=inputs)
+    pictures, grids = _pictures(camera, lidar), _grids(rows, inputs=inputs)
     beside, above = _divided("column", list(pictures)), _tiled(list(grids))
     return {
         "configById": {**pictures, **grids},
@@ -46,14 +49,16 @@ def viewer_layout(rows: Sequence[bool], cameras: Sequence[str], *, inputs: bool 
     }
 
 
-def _pictures(cameras: Sequence[str]) -> dict[str, dict[str, Any]]:
-    legend = {"Image!legend": _image("Legend", topics.GRID_LEGEND)}
-    if not cameras:
-        return legend
-    calibration = camera_topic(cameras[0], topics.CALIBRATION)
-    image, label = (camera_topic(cameras[0], channel) for channel in (topics.IMAGE, topics.LABEL))
-    shown = {"Image!image": _image("Camera", image, calibration), "Image!label": _image("Labels", label, calibration)}
-    return {**shown, **legend}
+def _pictures(camera: str | None, lidar: str | None) -> dict[str, dict[str, Any]]:
+    shown = {}
+    if camera is not None:
+        calibration = camera_topic(camera, topics.CALIBRATION)
+        image, label = (camera_topic(camera, channel) for channel in (topics.IMAGE, topics.LABEL))
+        shown["Image!image"] = _image("Camera", image, calibration)
+        shown["Image!label"] = _image("Labels", label, calibration)
+    if lidar is not None:
+        shown["Image!points"] = _image("Points, all around", topics.lidar_picture_topic(lidar))
+    return {**shown, "Image!legend": _image("Legend", topics.GRID_LEGEND)}
 
 
 def _grids(rows: Sequence[bool], *, inputs: bool) -> dict[str, dict[str, Any]]:

@@ -38,7 +38,7 @@ def grid_picture(stamp_ns: int, values: Grid, layer: GridLayer, mask: Grid | Non
         masked = len(layer.names)  # the id after those of all classes
         palette[masked] = MASK_COLOUR
         values = np.where(mask, np.uint8(masked), values)
-    return _picture(stamp_ns, with_palette(encode_gray(values), palette))
+    return picture_message(stamp_ns, with_palette(encode_gray(values), palette))
 
 
 def legend(stamp_ns: int, rows: Sequence[str], classes: ClassSet) -> CompressedImage:
@@ -58,7 +58,7 @@ def legend(stamp_ns: int, rows: Sequence[str], classes: ClassSet) -> CompressedI
         draw.text((left_px if colour != _BACKGROUND else x_px, top_px), text, _INK, font)
     stream = io.BytesIO()
     picture.save(stream, "PNG")
-    return _picture(stamp_ns, stream.getvalue())
+    return picture_message(stamp_ns, stream.getvalue())
 
 
 def row_name(stamp_ns: int, name: str, spec: GridSpec) -> SceneUpdate:
@@ -81,8 +81,9 @@ def row_name(stamp_ns: int, name: str, spec: GridSpec) -> SceneUpdate:
     return SceneUpdate(entities=[entity])
 
 
-def _picture(stamp_ns: int, png: bytes) -> CompressedImage:
-    return CompressedImage(timestamp=timestamp(stamp_ns), frame_id=GRID_FRAME, data=png, format="png")
+def picture_message(stamp_ns: int, png: bytes, frame: str = GRID_FRAME) -> CompressedImage:
+    """Return the message of a picture, a PNG file."""
+    return CompressedImage(timestamp=timestamp(stamp_ns), frame_id=frame, data=png, format="png")
 
 
 def _drawable(name: str) -> str:

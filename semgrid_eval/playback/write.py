@@ -7,6 +7,7 @@ from pathlib import Path
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import atomic_file, write_text
+from semgrid_eval.grids.shown import shown_camera, shown_lidar
 from semgrid_eval.log.codec import PLAYBACK_RECORD, PREDICTIONS_RECORD
 from semgrid_eval.log.predictions import RECORDING
 from semgrid_eval.log.writer import MessageWriter
@@ -149,11 +150,12 @@ class _Player:
 
     def layout(self, name: str) -> str:
         """Write the layout for what a recording's log shows."""
-        cameras: tuple[str, ...] = ()
+        camera = lidar = None
         if self._logs is not None:
             with ExitStack() as stack:
-                cameras = open_scored_log(self.record, self.rows[0], name, self._logs, stack).scene.cameras
-        layout = viewer_layout([row.is_unsure for row in self.rows], cameras, inputs=not self._live)
+                log, grid = open_scored_log(self.record, self.rows[0], name, self._logs, stack), self.rows[0].grid
+                camera, lidar = shown_camera(log, grid), shown_lidar(log, grid)
+        layout = viewer_layout([row.is_unsure for row in self.rows], camera, lidar, inputs=not self._live)
         return json.dumps(layout, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
     def metadata(self) -> dict[str, str]:

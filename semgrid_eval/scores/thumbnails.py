@@ -1,6 +1,7 @@
 """What a run keeps of a log so that a report can show it: small pictures of the frames in windows, and the track.
 
-`RUN/pictures/<key>.npz` holds that of one camera of one log, `<key>` being the digest of both and of the integrator:
+`RUN/pictures/<key>.npz` holds that of one log for the sensor that leads grids of it, `<key>` being the digest of both
+and of the integrator:
 
 - `stamps_ns` (K,) int64, ascending; the files of all images, then of all labels, one after the other as `images` and
   `labels` uint8, and where each ends as `image_ends` and `label_ends` (K,) int64. An empty file stands for a picture
@@ -36,7 +37,7 @@ class FramePictures:
     """The small pictures of one frame as files; empty where the log has none."""
 
     image: bytes = b""  # the camera's, as WebP
-    label: bytes = b""  # Cityscapes label ids as palette PNG
+    label: bytes = b""  # Cityscapes label ids as palette PNG: the camera's, or, without one, a LiDAR's panorama
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,12 @@ class Track:
     start_ns: int  # when the log begins
     stamps_ns: NDArray[np.int64]  # (F,) of all frames
     poses: NDArray[np.float64]  # (F, 3) x and y (m), yaw (rad) of the vehicle in the log's odom frame, as grids move by
-    projection: NDArray[np.float64]  # (3, 4)
+    projection: NDArray[np.float64]  # (3, 4); zeros where no camera is shown
+
+    @property
+    def has_camera(self) -> bool:
+        """Whether pictures are those of a camera."""
+        return bool(self.projection.any())
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +69,12 @@ class LogPictures:
 
 
 def pictures_file(run: Path, log_digest: str, grid: GridConfig) -> Path:
-    """Return where the pictures lie of the camera that leads the target of a log's grids."""
-    camera = grid.camera.camera if grid.camera else None
-    key = {"log": log_digest, "camera": camera, "integrator": grid.integrator, "format": FORMAT_VERSION}
+    """Return where the pictures lie that go with a log's grids: of the sensor that leads their target."""
+    if grid.camera is not None:
+        leader: dict[str, object] = {"camera": grid.camera.camera}
+    else:
+        leader = {"leader": grid.leader.model_dump(mode="json"), "camera": grid.camera_beside}
+    key = {"log": log_digest, "integrator": grid.integrator, "format": FORMAT_VERSION, **leader}
     return run / PICTURES / f"{digest_value(key)}.npz"
 
 

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.recording.png import MAX_PIXELS
+from semgrid_eval.recording.resizing import Size, nearest
 from semgrid_eval.segmentation.class_maps import find_class_map, maps_of
 from semgrid_eval.segmentation.config import SegmentationConfig
-from semgrid_eval.segmentation.pixels import Size, best_class, nearest, network_input, size_of
+from semgrid_eval.segmentation.pixels import best_class, network_input, size_of
 from semgrid_eval.segmentation.session import open_model, words_of
 
 _VOID = 255

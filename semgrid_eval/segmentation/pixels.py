@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Size = tuple[int, int]
-"""Width and height in pixels."""
+from semgrid_eval.recording.resizing import Size, nearest
 
 
 def network_input(
@@ -38,14 +37,6 @@ def best_class(scores: NDArray[np.floating], size: Size, *, smooth: bool) -> NDA
         ids[plane > best] = number
         np.maximum(best, plane, out=best)
     return ids if smooth else nearest(ids, size)
-
-
-def nearest(ids: NDArray[np.uint8], size: Size) -> NDArray[np.uint8]:
-    """Resize ids, each from the pixel that holds its centre: (h, w) -> (H, W)."""
-    if size == size_of(ids):
-        return ids
-    columns, rows = ((2 * np.arange(new) + 1) * old // (2 * new) for new, old in zip(size, size_of(ids), strict=True))
-    return ids[rows[:, np.newaxis], columns]
 
 
 def size_of(picture: NDArray[np.generic]) -> Size:

@@ -11,7 +11,6 @@ from pydantic import Field, model_validator
 
 from semgrid_eval.errors import LogError, located
 from semgrid_eval.log.topics import DISPARITY, LABEL, camera_topic
-from semgrid_eval.motion import EgoMotion, Integrator, Pose
 from semgrid_eval.sensors.sensor import Points, SensorConfig
 
 if TYPE_CHECKING:
@@ -80,15 +79,9 @@ def read_cameras(
     return heapq.merge(*streams, key=lambda points: points.stamp_ns)
 
 
-def frame_poses(log: "LogReader", sensor: CameraSensor, integrator: Integrator) -> list[Pose]:
-    """Return the vehicle's pose in the odom frame at each of the camera's frames.
-
-    Raises:
-        LogError: there is no such camera, or what is read is damaged.
-    """
-    topic = camera_topic(log.choose_camera(sensor.camera), DISPARITY)
-    motion = EgoMotion(log.motion(), integrator)
-    return [motion.pose_at(stamp_ns) for _, stamp_ns, _, _ in log.messages([topic])]
+def camera_frames(log: "LogReader", sensor: CameraSensor) -> str:
+    """Return the topic of what every frame of a sensor's camera has; a LogError says that there is no such camera."""
+    return camera_topic(log.choose_camera(sensor.camera), DISPARITY)
 
 
 def _read_camera(

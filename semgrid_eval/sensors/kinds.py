@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, SerializeAsAny, StringConstraints
 
+from semgrid_eval.classes import NO_POINT
 from semgrid_eval.config import of_kind
-from semgrid_eval.sensors.camera import CameraSensor, read_cameras
-from semgrid_eval.sensors.lidar import LidarSensor, read_lidars
+from semgrid_eval.log.topics import TRUE_ACTORS
+from semgrid_eval.sensors.camera import CameraSensor, camera_frames, read_cameras
+from semgrid_eval.sensors.lidar import LidarSensor, lidar_sweeps, read_lidars
 from semgrid_eval.sensors.sensor import Kind, Points, SensorConfig
 from semgrid_eval.sensors.tracks import TracksSensor, read_tracks
 
@@ -18,9 +20,9 @@ if TYPE_CHECKING:
     from semgrid_eval.log.reader import LogReader
 
 KINDS: dict[str, Kind] = {
-    "camera": Kind(CameraSensor, read_cameras),
-    "lidar": Kind(LidarSensor, read_lidars),
-    "tracks": Kind(TracksSensor, read_tracks),
+    "camera": Kind(CameraSensor, read_cameras, camera_frames),
+    "lidar": Kind(LidarSensor, read_lidars, lidar_sweeps),
+    "tracks": Kind(TracksSensor, read_tracks, lambda log, sensor: TRUE_ACTORS),
 }
 _DEFAULT_KIND = "camera"
 TOLERANCE_NS = 1_000_000
@@ -49,6 +51,19 @@ def read_points(
         by_kind.setdefault(sensor.kind, {})[name] = sensor
     streams = [KINDS[kind].read(log, chosen, class_by_label) for kind, chosen in by_kind.items()]
     return heapq.merge(*streams, key=lambda points: points.stamp_ns)
+
+
+def times_of(log: "LogReader", sensor: SensorConfig) -> Iterator[int]:
+    """Iterate over the times at which a sensor saw something, without looking at it where a topic tells them.
+
+    Raises:
+        LogError: as `read_points`.
+    """
+    kind = KINDS[sensor.kind]
+    if kind.topic is None:
+        points = kind.read(log, {sensor.kind: sensor}, np.full(256, NO_POINT, np.uint8))
+        return (each.stamp_ns for each in points)
+    return (stamp_ns for _, stamp_ns, _, _ in log.messages([kind.topic(log, sensor)]))
 
 
 def synchronise(

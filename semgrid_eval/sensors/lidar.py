@@ -11,6 +11,7 @@ from pydantic import Field
 from semgrid_eval.classes import NO_POINT
 from semgrid_eval.config import Config
 from semgrid_eval.errors import LogError
+from semgrid_eval.log.topics import lidar_topic
 from semgrid_eval.sensors.sensor import Morphology, Points, SensorConfig
 
 if TYPE_CHECKING:
@@ -48,6 +49,11 @@ def read_lidars(
         by_lidar.setdefault(log.choose_lidar(sensor.lidar), {})[name] = sensor
     streams = [_read_lidar(log, lidar, chosen, class_by_label) for lidar, chosen in by_lidar.items()]
     return heapq.merge(*streams, key=lambda points: points.stamp_ns)
+
+
+def lidar_sweeps(log: "LogReader", sensor: LidarSensor) -> str:
+    """Return the topic of a sensor's sweeps; a LogError says that there is no such LiDAR."""
+    return lidar_topic(log.choose_lidar(sensor.lidar))
 
 
 def _read_lidar(

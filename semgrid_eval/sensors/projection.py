@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.classes import NO_POINT
+from semgrid_eval.recording.resizing import nearest_indices
 from semgrid_eval.recording.types import CameraCalibration
 from semgrid_eval.sensors.exclusion import ALL_PIXELS, Exclusion
 
@@ -118,11 +119,6 @@ def unit_projection(calibration: CameraCalibration, size_px: tuple[int, int]) ->
     )
     optical_from_ego = calibration.ego_from_optical.inverse()
     return camera_matrix @ np.column_stack([optical_from_ego.rotation, optical_from_ego.translation_m])
-
-
-def nearest_indices(source: int, target: int) -> NDArray[np.intp]:
-    """Return, for each of `target` pixels, the nearest of `source` pixels along one axis (half-pixel centres)."""
-    return ((np.arange(target) + 0.5) * source / target).astype(np.intp)
 
 
 @numba.njit(cache=True, nogil=True)

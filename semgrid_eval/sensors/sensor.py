@@ -42,6 +42,7 @@ class Points:
     class_id: NDArray[np.uint8]  # where it is `NO_POINT` there is nothing, whatever the coordinates say
 
 
+TopicOf = Callable[["LogReader", Any], str]
 ReadPoints = Callable[["LogReader", Mapping[str, Any], NDArray[np.uint8]], Iterator[Points]]
 
 
@@ -54,3 +55,6 @@ class Kind:
     # class, and iterates over all that they saw in the order of time. Sensors that share data come together, so that it
     # is read and decoded once.
     read: ReadPoints
+    # Takes an open log and the settings of one sensor, and returns the topic whose messages have the times of what it
+    # saw. None where no topic does: whoever asks for the times reads the points.
+    topic: TopicOf | None = None

@@ -51,7 +51,8 @@ def test_commands_for_kitti(workplace):
     assert {row.name: row.failure for row in rows} == dict.fromkeys(("BL-NT", "BL-DC", "BL-Fuse"))
     offered = re.findall(r"semgrid-eval (play [^<]+)<", Path("runs/lidar/report/index.html").read_text())
     assert offered
-    assert run_command(shlex.split(unescape(offered[0]).replace("RUN", "runs/lidar"))).code == 0
+    words = shlex.split(unescape(offered[0]).replace("RUN", "runs/lidar").replace("LOGS", LIDAR))
+    assert run_command(words).code == 0
 
 
 def test_commands_for_argoverse(workplace):

@@ -9,6 +9,7 @@ from mcap.writer import Writer
 from support.bad.logs import as_it_is, copy
 from support.driving import CALIBRATION, FRAME_NS, START_NS, driving
 
+from semgrid_eval.config import parse_config
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.codec import PLAYBACK_RECORD, PREDICTIONS_RECORD, image_message
 from semgrid_eval.log.contract import Contract, Range, TopicContract
@@ -267,11 +268,27 @@ def test_log_without_labels_is_not_said_to_hold_train_ids(tmp_path):
     assert list(found) == ["/camera/front/label: missing_beside"]
 
 
-def test_values_that_are_no_labels_are_a_warning(tmp_path):
-    train_ids = encode_gray(np.full((32, 64), 255, np.uint8))
-    found = findings(tmp_path, lambda number, moment: with_frame(moment, label_png=train_ids))
-    text = "is 255; are they train ids? (allowed: 0 to 33)"
-    assert found["/camera/front/label: label_id"] == (Severity.WARNING, text)
+def test_ids_that_only_a_class_set_of_ones_own_knows_are_no_fault(tmp_path):
+    assert findings(tmp_path, lambda number, moment: with_labels(moment, 40 + 10 * number)) == {}
+
+
+def test_train_ids_are_told_where_some_pixels_are_void(tmp_path):
+    ids = np.full((32, 64), 255, np.uint8)
+    ids[:16] = 13
+    found = findings(tmp_path, lambda number, moment: with_frame(moment, label_png=encode_gray(ids)))
+    assert found["labels"][1].startswith("the largest id is 13, so they look like train ids")
+
+
+def test_a_contract_may_say_which_ids_there_are(tmp_path):
+    write_log(
+        replace(driving(), moments=lambda: smooth(lambda number, moment: with_labels(moment, 40))),
+        tmp_path / "log.mcap",
+    )
+    limits = {"topics": {"/camera/{camera}/label": {"values": {"label_id": {"low": 0, "high": 33}}}}}
+    found = check_log(tmp_path / "log.mcap", parse_config(Contract, limits)).findings
+    assert [(each.place, each.message) for each in found] == [
+        ("/camera/front/label: label_id", "is 40 (allowed: 0 to 33)")
+    ]
 
 
 def test_a_damaged_attachment_is_an_error_where_no_checksum_of_all_data_tells(tmp_path):

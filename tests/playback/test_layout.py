@@ -8,28 +8,35 @@ def panels(node):
     return [node] if isinstance(node, str) else panels(node["first"]) + panels(node["second"])
 
 
-@pytest.mark.parametrize("cameras", [(), ("front",), ("front", "rear")])
+@pytest.mark.parametrize("camera", [None, "front"])
 @pytest.mark.parametrize("rows", [[False], [True], [True, False, True, True]])
 @pytest.mark.parametrize("inputs", [True, False])
-def test_every_panel_is_placed_once_and_configured(cameras, rows, inputs):
-    layout = viewer_layout(rows, cameras, inputs=inputs)
+def test_every_panel_is_placed_once_and_configured(camera, rows, inputs):
+    layout = viewer_layout(rows, camera, inputs=inputs)
     placed = panels(layout["layout"])
     assert sorted(placed) == sorted(layout["configById"])
     assert len(set(placed)) == len(placed)
-    assert ("Image!image" in placed) == bool(cameras)
+    assert ("Image!image" in placed) == bool(camera)
     assert ("3D!input" in placed) == inputs
     assert "Image!legend" in placed
 
 
-def test_pictures_are_those_of_the_first_camera():
-    shown = viewer_layout([True], ("front", "rear"))["configById"]
+def test_pictures_are_those_of_the_camera():
+    shown = viewer_layout([True], "front")["configById"]
     assert shown["Image!label"]["imageMode"]["imageTopic"] == "/camera/front/label"
     assert shown["Image!label"]["imageMode"]["calibrationTopic"] == "/camera/front/calibration"
     assert shown["Image!legend"]["imageMode"] == {"imageTopic": "/grid/legend"}
 
 
+def test_without_a_camera_a_lidars_points_are_shown():
+    layout = viewer_layout([True], None, "top")
+    assert "Image!image" not in panels(layout["layout"])
+    assert layout["configById"]["Image!points"]["imageMode"] == {"imageTopic": "/lidar/top/label"}
+    assert "Image!points" in panels(layout["layout"])
+
+
 def test_each_row_has_a_panel_and_certainty_only_where_it_has_one_all_in_their_own_colours():
-    shown = viewer_layout([False, True], ())["configById"]
+    shown = viewer_layout([False, True], None)["configById"]
     assert list(shown["3D!input"]["topics"])[:2] == ["/grid/input/1/1", "/grid/input/1/2"]
     assert list(shown["3D!target"]["topics"]) == ["/grid/target", "/grid/mask/1"]
     assert list(shown["3D!prediction1"]["topics"]) == ["/grid/prediction/1", "/grid/prediction/1/name"]
@@ -41,7 +48,7 @@ def test_each_row_has_a_panel_and_certainty_only_where_it_has_one_all_in_their_o
 
 
 def test_panels_have_titles_for_foxglove_and_for_lichtblick_that_tell_them_apart():
-    shown = viewer_layout([True, True], ("front",))["configById"]
+    shown = viewer_layout([True, True], "front")["configById"]
     titles = [panel["foxglovePanelTitle"] for panel in shown.values()]
     assert titles == [panel["lichtblickPanelTitle"] for panel in shown.values()]
     assert len(set(titles)) == len(titles) == 9
@@ -65,10 +72,10 @@ IMAGE_MODE = {"imageTopic", "calibrationTopic"}
 GRID = {"visible", "colorMode", "colorField", "interpolationMethod"}
 
 
-@pytest.mark.parametrize("cameras", [(), ("front",)])
-def test_the_layout_has_the_form_that_viewers_read(cameras):
+@pytest.mark.parametrize("camera", [None, "front"])
+def test_the_layout_has_the_form_that_viewers_read(camera):
     """As Lichtblick's `LayoutData` and `RendererConfig`, and Foxglove's layout types, have it."""
-    layout = viewer_layout([True, False], cameras)
+    layout = viewer_layout([True, False], camera)
     assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
     assert isinstance(layout["playbackConfig"]["speed"], float | int)
     check_mosaic(layout["layout"])

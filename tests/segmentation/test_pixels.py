@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch.nn.functional import interpolate
 
-from semgrid_eval.segmentation.pixels import best_class, nearest, network_input
+from semgrid_eval.segmentation.pixels import best_class, network_input
 
 SIDES = st.integers(1, 12)
 
@@ -48,7 +48,6 @@ def test_nearest_classes_are_those_of_the_pixel_whose_area_holds_the_centre(seed
     rows = [floor(Fraction(2 * row + 1, 2) / new_height * height) for row in range(new_height)]
     columns = [floor(Fraction(2 * column + 1, 2) / new_width * width) for column in range(new_width)]
     ids = scores.argmax(axis=0).astype(np.uint8)
-    assert np.array_equal(nearest(ids, (new_width, new_height)), ids[np.ix_(rows, columns)])
     assert np.array_equal(best_class(scores, (new_width, new_height), smooth=False), ids[np.ix_(rows, columns)])
 
 

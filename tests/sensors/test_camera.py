@@ -7,9 +7,8 @@ from semgrid_eval.classes import DEFAULT_CLASSES, NO_POINT
 from semgrid_eval.errors import LogError
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
-from semgrid_eval.motion import EgoMotion
 from semgrid_eval.recording import png
-from semgrid_eval.sensors.camera import CameraSensor, frame_poses, read_cameras
+from semgrid_eval.sensors.camera import CameraSensor, read_cameras
 
 
 @pytest.fixture
@@ -52,14 +51,6 @@ def test_a_log_of_several_cameras_wants_a_name_and_a_frame_wants_labels(log, tmp
     write_log(driving(), tmp_path / "bare.mcap")
     with LogReader(tmp_path / "bare.mcap") as bare, pytest.raises(LogError, match="has no label image"):
         read(bare, any=CameraSensor())
-
-
-def test_poses_are_those_of_the_cameras_own_times(log):
-    poses = frame_poses(log, CameraSensor(camera="left"), "arc")
-    stamps_ns = [frame.stamp_ns for frame in log.frames("left")]
-    motion = EgoMotion(log.motion(), "arc")
-    assert poses == [motion.pose_at(stamp_ns) for stamp_ns in stamps_ns]
-    assert poses[1].x_m > poses[0].x_m > 0
 
 
 def test_parts_belong_together_if_their_camera_is_the_same_or_the_only_one():

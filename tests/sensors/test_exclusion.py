@@ -6,8 +6,9 @@ from hypothesis.extra.numpy import arrays
 from support.cameras import calibration
 
 from semgrid_eval.classes import NO_POINT
+from semgrid_eval.recording.resizing import nearest_indices
 from semgrid_eval.sensors.exclusion import Exclusion, beside_steps, near_borders
-from semgrid_eval.sensors.projection import Projection, nearest_indices
+from semgrid_eval.sensors.projection import Projection
 
 
 def picture(*lines):

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from support.cameras import calibration, slow_point
 
 from semgrid_eval.classes import NO_POINT
-from semgrid_eval.sensors.projection import Projection, ground_slope, nearest_indices, unit_projection
+from semgrid_eval.sensors.projection import Projection, ground_slope, unit_projection
 
 angle = st.floats(-0.5, 0.5)
 
@@ -31,14 +31,6 @@ def test_half_size_image_looks_where_the_full_one_does():
     half = ground_slope(camera, (512, 256), (256, 128))
     between = (full[:, 0::2, 0::2] + full[:, 1::2, 1::2]) / 2
     np.testing.assert_allclose(half, between, atol=1e-12)
-
-
-@pytest.mark.parametrize(("source", "target"), [(2048, 512), (1241, 512), (376, 256), (100, 256), (7, 7)])
-def test_nearest_indices_pick_the_closest_centre(source, target):
-    centres = (np.arange(target) + 0.5) / target
-    distance = np.abs((np.arange(source) + 0.5) / source - centres[:, None])
-    picked = nearest_indices(source, target)
-    np.testing.assert_allclose(distance[np.arange(target), picked], distance.min(axis=1), atol=1e-12)
 
 
 @pytest.mark.parametrize("size_px", [(8, 6), (4, 3), (16, 12)])

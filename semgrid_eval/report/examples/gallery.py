@@ -91,9 +91,9 @@ def gaps(rows: Sequence[Row], groups: Sequence[Group]) -> list[str]:
     if not any(group.looks_ahead for group in groups):
         said.append("The model shown first was not run with several horizons, so there is no example of them in a row.")
     columns = [column for group in groups for window in group.windows for column in window.film]
-    if columns and not any(picture.kind == "camera" for column in columns for picture in column.pictures):
+    if columns and all(picture.kind == "grid" for column in columns for picture in column.pictures):
         said.append(
-            "There are no camera images: the run kept none of its logs, or they hold none. "
+            "There are no pictures of what sensors saw: the run kept none of its logs, or they hold none. "
             "Started again where its logs are, semgrid-eval run adds what is missing."
         )
     return said

@@ -164,7 +164,7 @@ def draw_examples(shown: Shown, picks: Sequence[Pick], thumbnails: RunThumbnails
             title="; ".join(f"{pick.reason}: {(signed if contest.rivals else number)(pick.score)}" for pick in group),
             window=window,
             times=times(window.target_stamp_ns, kept),
-            command=thumbnails.command(contest.model, window, result.grid),
+            command=thumbnails.command(contest.model, window),
             film=film,
             answers=answers,
             legend=tuple(legend[i] for i in sorted(colours | ({drawing.hatched(classes)} if hatching else set()))),

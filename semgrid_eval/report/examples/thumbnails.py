@@ -43,10 +43,9 @@ class RunThumbnails:
         """Return the track of such a log alone; all that are asked for stay in memory."""
         return self._read_track(self._file(log, result))
 
-    def command(self, row: Row, window: WindowRecord, grid: GridConfig | None) -> str:
-        """Write the command that plays a window's recording; with its log only where a camera leads the target."""
-        has_camera = grid is None or grid.camera is not None
-        return play_command(self._run.record.command, row.record.name, window.recording, with_logs=has_camera)
+    def command(self, row: Row, window: WindowRecord) -> str:
+        """Write the command that plays a window's recording."""
+        return play_command(self._run.record.command, row.record.name, window.recording)
 
     def _file(self, log: str, result: Result) -> Path | None:
         asked = (log, result.folder)
@@ -92,14 +91,14 @@ class View:
     sensors: tuple[str, ...]  # names of those of the inputs
 
     def photos(self, stamp_ns: int, moment: str) -> Iterator[Picture]:
-        """Return the camera image and the segmentation of a time, as far as they were kept."""
+        """Return the camera image and the segmentation of a time, or a LiDAR's points, as far as they were kept."""
         if self.kept is None or self.grid is None or stamp_ns not in self.kept.frames:
             return
         files = self.kept.frames[stamp_ns]
         if files.image:
             yield Picture("Camera", f"Camera image, {moment}", data_uri(files.image, "image/webp"), kind="camera")
         with suppress(InputError):  # there is none, or it is damaged
-            title = "Segmentation"
+            title = "Segmentation" if self.kept.track.has_camera else "Points, all around"
             yield label_picture((title, f"{title}, {moment}"), files.label, self.grid)
 
     def before(self, stamp_ns: int) -> str:

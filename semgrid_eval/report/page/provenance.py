@@ -187,19 +187,18 @@ def row_command(command: str, row: str, matrix: str) -> str:
     return shlex.join([*kept, "--row", row])
 
 
-def play_command(command: str, row: str, recording: str, *, with_logs: bool = True) -> str:
+def play_command(command: str, row: str, recording: str) -> str:
     """Return the command line that plays a recording of a row, with the folders that the run's own names.
 
     Args:
         command: of the run.
         row: its name.
         recording: its name.
-        with_logs: show the log's pictures, which can be found where a camera leads the target.
     """
     spread = [part for word in _words(command) for part in (word.split("=", 1) if word.startswith("--") else [word])]
     found = {name: value for name, value in pairwise(spread) if name.startswith("--")}
     logs = found.get("--validation-logs", found.get("--logs", "LOGS"))
-    where = [found.get("--out", "RUN"), row, *(["--logs", logs] if with_logs else [])]
+    where = [found.get("--out", "RUN"), row, "--logs", logs]
     return shlex.join(["semgrid-eval", "play", *where, "--recording", recording, "--out", "play.mcap"])
 
 

@@ -11,8 +11,7 @@ EDGES_M = (20.0, 40.0, 60.0)
 
 def bands_of(spec: GridSpec) -> NDArray[np.int64]:
     """Number the band of each cell by the distance of its centre: -> (H, W)."""
-    forward_m, left_m = spec.centres_m()
-    return np.asarray(np.digitize(np.hypot(forward_m[:, None], left_m), EDGES_M), np.int64)
+    return np.asarray(np.digitize(spec.ranges_m(), EDGES_M), np.int64)
 
 
 def _number(scored: ScoredWindows) -> NDArray[np.int64]:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 
 from semgrid_eval.sources.ros2.clouds_seen import CloudSeen
-from semgrid_eval.sources.ros2.contents import Contents
+from semgrid_eval.sources.ros2.contents import Contents, Seen
 
 _ONLY = "top"
 _GENERIC = {"points", "points_raw", "point_cloud", "pointcloud", "cloud", "packets", "lidar", "sensing"}
@@ -12,23 +12,31 @@ _GENERIC = {"points", "points_raw", "point_cloud", "pointcloud", "cloud", "packe
 
 def draft_lidars(contents: Contents, vehicle: str) -> Iterator[str]:
     """Write a block for each topic of clouds that can be read, but for those that are made of a camera's pictures."""
-    clouds = {name: seen for name, seen in contents.topics.items() if seen.cloud is not None}
-    pictured = {seen.frame for seen in contents.topics.values() if seen.shape is not None}
-    swept = {name: seen for name, seen in clouds.items() if seen.frame not in pictured}
+    swept = _swept(contents)
     if swept:
         yield "lidars:"
-    for name, (topic, seen) in zip(_names(list(swept)), swept.items(), strict=True):
+    for name, (topic, seen) in zip(lidar_names(contents), swept.items(), strict=True):
         assert seen.cloud is not None
         yield f"  {name}:"
         yield f"    cloud: {topic}"
         yield from _fields(seen.cloud)
         yield from place_lines(contents, vehicle, seen.frame or "the LiDAR", "it")
-    for topic in sorted(clouds.keys() - swept.keys()):
+    for topic in sorted(_clouds(contents).keys() - swept.keys()):
         yield f"# {topic} has the frame of a camera, as points made of its pictures have: left out."
 
 
-def _names(topics: list[str]) -> list[str]:
-    """Name LiDARs by what is particular in their topics."""
+def _clouds(contents: Contents) -> dict[str, Seen]:
+    return {name: seen for name, seen in contents.topics.items() if seen.cloud is not None}
+
+
+def _swept(contents: Contents) -> dict[str, Seen]:
+    pictured = {seen.frame for seen in contents.topics.values() if seen.shape is not None}
+    return {name: seen for name, seen in _clouds(contents).items() if seen.frame not in pictured}
+
+
+def lidar_names(contents: Contents) -> list[str]:
+    """Name the LiDARs of the map by what is particular in their topics."""
+    topics = list(_swept(contents))
     if len(topics) == 1:
         return [_ONLY]
     parts = [[part for part in re.findall(r"[A-Za-z0-9_-]+", topic) if part not in _GENERIC] for topic in topics]

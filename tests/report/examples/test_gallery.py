@@ -57,7 +57,7 @@ def test_what_a_run_cannot_show_is_said(tmp_path):
     rows = (FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 1))
     loaded, groups = gallery(make_fake_run(tmp_path / "run", rows=rows, recordings=2, windows=1))
     said = " ".join(gaps(loaded, groups))
-    for words in ("no example with a blind band", "no example of them in a row", "There are no camera images"):
+    for words in ("no example with a blind band", "no example of them in a row", "no pictures of what sensors saw"):
         assert words in said
     assert gaps(loaded, []) == []
 
@@ -96,7 +96,7 @@ def test_damaged_pictures_are_left_out(seen, tmp_path):
         path.write_bytes(path.read_bytes()[:-40])
     rows, groups = gallery(tmp_path / "run")
     assert all(group.problem == "" for group in groups)
-    assert "There are no camera images" in gaps(rows, groups)[0]
+    assert "There are no pictures of what sensors saw" in gaps(rows, groups)[0]
 
 
 @pytest.mark.parametrize("lost", ["predictions.npz", "windows"])

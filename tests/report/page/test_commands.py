@@ -41,8 +41,3 @@ def test_a_window_is_played_from_the_folders_of_the_runs_own_command(command, wh
     words = shlex.split(play_command(command, "own-DC", "it's $HOME #2"))
     expected = [where[0], "own-DC", "--logs", where[1], "--recording", "it's $HOME #2", "--out", "play.mcap"]
     assert words == ["semgrid-eval", "play", *expected]
-
-
-def test_a_window_of_which_there_are_no_pictures_is_played_without_logs():
-    words = shlex.split(play_command("semgrid-eval run m --logs logs --out run", "BL-DC", "05", with_logs=False))
-    assert words == ["semgrid-eval", "play", "run", "BL-DC", "--recording", "05", "--out", "play.mcap"]
