@@ -83,7 +83,7 @@ class Subject:
     def __init__(self, worker: Worker, row: Row, calibrated: int, scored: int) -> None:
         seed = worker.example_seed if row.facts.learns else None
         job = worker.look(row, seed)
-        self.model = worker.fitted(job).model.eval()
+        self.model = worker.fitted(job).model
         self.network = plain_network(self.model)
         self.scored = spread(job.scored, scored)
         data = worker.training_data.data(row.grid, row.train_split)
