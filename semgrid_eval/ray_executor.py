@@ -33,7 +33,14 @@ _KEPT_HERE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"
 _TOKEN = "RAY_AUTH_TOKEN"
 
 # Ray's errors where a worker, its machine or the result there is gone; the last is the base of several.
-_LOST = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError", "ObjectLostError")
+_LOST = (
+    "WorkerCrashedError",
+    "OutOfMemoryError",
+    "LocalRayletDiedError",
+    "NodeDiedError",
+    "TaskUnschedulableError",
+    "ObjectLostError",
+)
 
 
 class RayExecutor:
@@ -115,8 +122,9 @@ class RayExecutor:
                     raise InputError(fault, path=path, field="ray")
 
     def _ask(self, node: str, paths: Sequence[Path]) -> Any:  # noqa: ANN401 - Ray is untyped
-        strategy = importlib.import_module("ray.util.scheduling_strategies").NodeAffinitySchedulingStrategy(node, False)
-        return self._ray.remote(num_cpus=0, scheduling_strategy=strategy)(_unseen).remote(paths)
+        strategies = importlib.import_module("ray.util.scheduling_strategies")
+        there = strategies.NodeAffinitySchedulingStrategy(node, soft=False)
+        return self._ray.remote(num_cpus=0, scheduling_strategy=there)(_unseen).remote(paths)
 
     def close(self) -> None:
         """Leave the cluster, and stop it if it was started here."""
