@@ -35,8 +35,8 @@ from semgrid_eval.runs.row import Row, plan_units
 RECORDINGS, VALIDATED = 420, 120
 """Of town-v1 small: all, and those that are scored, in one window each."""
 RATES = Path(__file__).resolve().parent.parent / "reports" / "gpu"
-FLAT, NEARLY = 0.15, 0.85
-"""Exponents below the first are called flat, from the second on linear."""
+NEARLY = 0.2
+"""How far an exponent may be from 0 to be called flat, and from 1 to be called linear."""
 WORDS = {"recordings": "recordings", "side": "cells of a grid", "classes": "classes", "sensors": "sensors",
          "lead": "lead, frames"}  # fmt: skip
 
@@ -130,7 +130,7 @@ def tables(found: dict[str, Any]) -> Iterator[str]:
 
 def in_words(power: float) -> str:
     """Name a power of a quantity."""
-    kind = "flat" if abs(power) < FLAT else "linear" if NEARLY <= power <= 2 - NEARLY else "in between"
+    kind = "flat" if abs(power) < NEARLY else "linear" if abs(power - 1) < NEARLY else "in between"
     return f"{kind} ({power:+.2f})"
 
 

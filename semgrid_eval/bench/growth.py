@@ -3,6 +3,7 @@
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -167,15 +168,17 @@ def prices(size: Size) -> dict[str, float]:
 
 
 def window_s(subject: Subject, repeats: int) -> float:
-    """Measure the processor seconds of one window of an update, batch 8."""
-    network = subject.network(epochs=1, updates_per_epoch=1, batch=BATCH, precision="float32")
+    """Measure the processor seconds of one window of an update, batch 8, without what a training does once."""
 
-    def work() -> None:
+    def work(updates: int) -> None:
+        network = subject.network(epochs=1, updates_per_epoch=updates, batch=BATCH, precision="float32")
         with tempfile.TemporaryDirectory() as folder:
             train(network, random_windows(), seed=0, device=CPU, folder=Path(folder))
 
-    work()
-    return processor_s(work, repeats) / BATCH
+    few, more = 1, 3
+    work(few)
+    spent_s = {updates: processor_s(partial(work, updates), repeats) for updates in (few, more)}
+    return (spent_s[more] - spent_s[few]) / (more - few) / BATCH
 
 
 def exponents(points: Sequence[dict[str, Any]]) -> dict[str, dict[str, float]]:
