@@ -9,27 +9,38 @@ import shutil
 import socket
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
 from semgrid_eval.errors import InputError, MissingExtraError, first_line
 from semgrid_eval.executors import NoRoomError, WorkerDied, thread_variables
+from semgrid_eval.files import locked
 from semgrid_eval.workplace import LOCAL
+
+_log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 CONNECTION_TIMEOUT_S = 5.0
 _LOOPBACK = "127.0.0.1"
+_PROBE = ".shared"  # a file that all machines must see, for a moment
 # Ray reads these when it is imported. Where the first is off, addresses of this machine stay on its loopback interface;
 # whoever connects has to know the token, which is passed on by the environment alone.
 _KEPT_HERE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
 _TOKEN = "RAY_AUTH_TOKEN"
 
 # Ray's errors where a worker, its machine or the result there is gone; the last is the base of several.
-_LOST = ("WorkerCrashedError", "OutOfMemoryError", "LocalRayletDiedError", "NodeDiedError", "ObjectLostError")
+_LOST = (
+    "WorkerCrashedError",
+    "OutOfMemoryError",
+    "LocalRayletDiedError",
+    "NodeDiedError",
+    "TaskUnschedulableError",
+    "ObjectLostError",
+)
 
 
 class RayExecutor:
@@ -93,6 +104,28 @@ class RayExecutor:
             for reference in pending:
                 self._ray.cancel(reference)
 
+    def check_shared(self, read: Sequence[Path], written: Path) -> None:
+        """Make sure that every machine that works sees what is read, and the folder that is written, which is made.
+
+        Raises:
+            InputError: one of them does not, under the same path; or the folder cannot be written.
+        """
+        with locked(written, _PROBE):
+            paths = [path.absolute() for path in (*read, written / _PROBE)]
+            machines = [node for node in self._ray.nodes() if node["Alive"] and node["Resources"].get("CPU")]
+            asked = {self._ask(node["NodeID"], paths): node["NodeManagerHostname"] for node in machines}
+            for reference, host in asked.items():
+                unseen = self._result(reference)
+                if unseen and not isinstance(unseen, WorkerDied):  # whoever dies does no work either
+                    path = [*read, written][unseen[0]]
+                    fault = f"is not seen by the machine {host}; all of a cluster must reach it under this path"
+                    raise InputError(fault, path=path, field="ray")
+
+    def _ask(self, node: str, paths: Sequence[Path]) -> Any:  # noqa: ANN401 - Ray is untyped
+        strategies = importlib.import_module("ray.util.scheduling_strategies")
+        there = strategies.NodeAffinitySchedulingStrategy(node, soft=False)
+        return self._ray.remote(num_cpus=0, scheduling_strategy=there)(_unseen).remote(paths)
+
     def close(self) -> None:
         """Leave the cluster, and stop it if it was started here."""
         self._ray.shutdown()
@@ -129,6 +162,8 @@ class RayExecutor:
     def _initialise(self, name: str, **options: Any) -> None:  # noqa: ANN401 - Ray is untyped
         try:
             self._ray.init(**options, include_dashboard=False, log_to_driver=False, logging_level=logging.ERROR)
+            # What Ray has to say of machines that are lost would go to the standard output, among the results.
+            self._ray._private.worker.print_to_stdstream = _note
         except (ConnectionError, RuntimeError, ValueError, OSError) as error:
             self.close()
             raise InputError(f"cannot be reached: {first_line(error)}", field=f"ray {name}") from error
@@ -148,6 +183,16 @@ def _apply(function: Callable[[T], R], item: T, folder: str) -> R:
     with suppress(OSError):  # another machine may lack the folder, and whole paths need none
         os.chdir(folder)
     return function(item)
+
+
+def _unseen(paths: Sequence[Path]) -> list[int]:
+    """Return which of the paths are not there."""
+    return [number for number, path in enumerate(paths) if not path.exists()]
+
+
+def _note(data: Mapping[str, Any], *_: object, **__: object) -> None:
+    """Take a message of Ray in place of its printing."""
+    _log.info("ray: %s", "; ".join(line.partition("\n")[0] for line in data["lines"]))
 
 
 def _check_reachable(address: str) -> None:

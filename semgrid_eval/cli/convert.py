@@ -9,7 +9,7 @@ import click
 from semgrid_eval.cli.console import loudness_options, progress
 from semgrid_eval.cli.converted import show
 from semgrid_eval.cli.groups import TableGroup
-from semgrid_eval.cli.options import FOLDER, chosen_executor, executor_options, workers_option
+from semgrid_eval.cli.options import FOLDER, Folders, chosen_executor, executor_options, workers_option
 from semgrid_eval.sources.known import SOURCES, Source, load_source
 
 
@@ -44,7 +44,8 @@ def command_of(name: str, source: Source[Any]) -> click.Command:
             click.echo(source.inspect(parse_config(source.options, given)))
             return 0
         assert out is not None, "it may be left out with --inspect alone"
-        work = Work(workers, chosen_executor(executor, address, workers), given.pop("cache", None), progress)
+        work_on = chosen_executor(executor, address, workers, Folders([], out))
+        work = Work(workers, work_on, given.pop("cache", None), progress)
         return show(source.convert(parse_config(source.options, given), out, work), out)
 
     parameters = [*parameters_of(source.options), click.Argument(["out"], type=FOLDER)]

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from semgrid_eval.cli.console import complain, loudness_options, progress, say
-from semgrid_eval.cli.options import FOLDER, THERE, chosen_executor, executor_options, workers_option
+from semgrid_eval.cli.options import FOLDER, THERE, Folders, chosen_executor, executor_options, workers_option
 
 
 def _print_classes(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -45,7 +45,7 @@ def command(logs: Path, out: Path, config: Path | None, workers: int, executor: 
     grid_config = GridConfig()
     if config:
         grid_config = parse_config(GridConfig, with_classes(load_yaml(config) or {}, config, "classes"), path=config)
-    work_on = chosen_executor(executor, address, workers)
+    work_on = chosen_executor(executor, address, workers, Folders([logs], out))
     with progress("grids") as watch:
         data = build_grids(find_logs(logs), out, grid_config, executor=work_on, progress=watch)
     for reason in data.failed.values():

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
@@ -98,8 +98,15 @@ def own_model_options(command: Command) -> Command:
     return apart(time(memory(command)))
 
 
+class Folders(NamedTuple):
+    """What all machines of a cluster must reach under the same paths."""
+
+    read: Sequence[Path]
+    written: Path
+
+
 def chosen_executor(
-    name: str, address: str, workers: int, *, gpus: float = 0.0, shared: Sequence[str] = ()
+    name: str, address: str, workers: int, folders: Folders, *, gpus: float = 0.0, shared: Sequence[str] = ()
 ) -> "Executor":
     """Make the executor that options ask for, `local` or `ray`.
 
@@ -107,11 +114,15 @@ def chosen_executor(
 
     Raises:
         MissingExtraError: Ray is asked for and not installed.
-        InputError: the cluster cannot be reached, or never has what a piece of work asks for.
+        InputError: the cluster cannot be reached, never has what a piece of work asks for, or does not share `folders`.
     """
     from semgrid_eval.executors import local_executor
     from semgrid_eval.ray_executor import RayExecutor
 
     if name == LOCAL:
         return local_executor(workers, gpus=shared)
-    return RayExecutor(address, gpus=gpus, local_cpus=workers if address == LOCAL else None)
+    if address == LOCAL:
+        return RayExecutor(gpus=gpus, local_cpus=workers)
+    cluster = RayExecutor(address, gpus=gpus)
+    cluster.check_shared(folders.read, folders.written)
+    return cluster

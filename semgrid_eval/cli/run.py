@@ -11,6 +11,7 @@ from semgrid_eval.cli.options import (
     FOLDER,
     FOLDER_THERE,
     THERE,
+    Folders,
     chosen_executor,
     device_option,
     executor_options,
@@ -100,10 +101,12 @@ def command(
     with run_own_models(guest_limits(time_limit, memory_limit) if own_models == "apart" else None):
         resolved = load_matrix(matrix, models=models)
         shared = visible_gpus() if device in ("auto", "cuda") else ()
-        rows_on = chosen_executor(executor, address, jobs, gpus=gpus, shared=shared)
-        # A cluster that is started here has --jobs cores, and grids are to be built on --workers.
-        grids_on = local_executor(workers) if address == LOCAL else chosen_executor(executor, address, workers)
         kept = grids or out / "grids"
+        folders = Folders([*filter(None, (logs, validation_logs, trainings))], out)
+        rows_on = chosen_executor(executor, address, jobs, folders, gpus=gpus, shared=shared)
+        # A cluster that is started here has --jobs cores, and grids are to be built on --workers.
+        built = folders._replace(written=kept)
+        grids_on = local_executor(workers) if address == LOCAL else chosen_executor(executor, address, workers, built)
         options = RunOptions(
             device, kept, command_line(), only, rows_on, grids_on, pictures, validation_logs, trainings, any_machine
         )

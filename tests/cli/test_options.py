@@ -1,11 +1,13 @@
 """The same commands in this machine's processes and on a Ray cluster that is started here, with the same results."""
 
+from pathlib import Path
+
 import pytest
 from click.testing import CliRunner
 from support.cityscapes_tree import Tree, put
 
 from semgrid_eval.cli.main import cli
-from semgrid_eval.cli.options import chosen_executor
+from semgrid_eval.cli.options import Folders, chosen_executor
 from semgrid_eval.executors import InProcess, Processes
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.scores.results import read_run, result_folder
@@ -45,8 +47,8 @@ def call(*arguments):
 
 
 def test_workers_say_how_many_processes_there_are():
-    assert isinstance(chosen_executor("local", "local", 1), InProcess)
-    several = chosen_executor("local", "local", 3, shared=("0",))
+    assert isinstance(chosen_executor("local", "local", 1, Folders([], Path("out"))), InProcess)
+    several = chosen_executor("local", "local", 3, Folders([], Path("out")), shared=("0",))
     assert isinstance(several, Processes)
     assert several.parallel == 3
 
