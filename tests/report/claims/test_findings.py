@@ -239,10 +239,8 @@ def test_tables_and_records_tell_the_same():
     frame, records = finding_frame(found), finding_records(found)
     assert frame.verdict.tolist() == [each["verdict"] for each in records for _ in each["checks"]]
     assert frame[frame.name == "large-BL-DC"].comparison_verdict.tolist() == ["holds", "does not hold"]
-    assert (
-        sentence(found)
-        == "Of 39 claims, the paper's and ours about stronger baselines, 2 can be tested here: 1 holds, 1 does not, 0 are undecided."
-    )
+    whose = "Of 39 claims, the paper's and ours about stronger baselines"
+    assert sentence(found) == f"{whose}, 2 can be tested here: 1 holds, 1 does not, 0 are undecided."
 
 
 def test_each_run_has_its_own_findings(tmp_path):

@@ -105,10 +105,7 @@ def test_a_windows_log_is_listed_under_the_same_name(page):
 
 def test_findings_count_their_verdicts(page):
     found = _read(page)
-    assert (
-        "Of 39 claims, the paper's and ours about stronger baselines, 9 can be tested here: 4 hold, 1 does not, 4 are undecided."
-        in found.text
-    )
+    assert "9 can be tested here: 4 hold, 1 does not, 4 are undecided." in found.text
     assert "ED-DC is better than BL-Fuse on static classes and vehicles does not hold" in found.text
     assert "ED-DC is better than BL-DC on moving vehicles alone holds" in found.text
     assert "ED-NT falls behind ED-DC on small classes ED-NT" in found.text  # its row failed, so it stands as a need
