@@ -97,9 +97,7 @@ def pack(folders: Folders, row: Row) -> None:
     """Pack the grids of the logs, if that is not done yet."""
     if not is_packed(folders.packed):
         executor = local_executor(2)
-        data = RunData(
-            folders.logs, folders.out / "grids", [row], executor=executor, device=CPU, stage=silent_stage
-        )
+        data = RunData(folders.logs, folders.out / "grids", [row], executor=executor, device=CPU, stage=silent_stage)
         pack_grids(data, row.grid, folders.packed)
 
 

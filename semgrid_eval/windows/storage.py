@@ -1,8 +1,11 @@
 """Where the cells of all recordings lie: on a device, in memory, or in a file that is mapped into memory."""
 
+import math
 import mmap
 import os
+import weakref
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -58,7 +61,8 @@ class GatheredBlock:
     """
 
     def __init__(self, recordings: Sequence["RecordingGrids"], sensors: Sequence[str], storage: Storage) -> None:
-        self._recordings, self._sensors, self._folder = recordings, sensors, storage.folder
+        self._recordings, self._sensors = recordings, sensors
+        self._folder = storage.folder if storage.device.type == "cpu" else None
         self._file: BinaryIO | None = None
         frames = sum(len(recording.stamps_ns) for recording in recordings)
         self.shape: Shape = (len(sensors), frames, *recordings[0].size)
@@ -72,8 +76,7 @@ class GatheredBlock:
             ResultError: the file of a recording is gone or damaged.
             InputError: there is no room for the file that is mapped.
         """
-        in_memory = self._folder is None or self.device.type != "cpu"
-        found = self._held() if in_memory else self._mapped()
+        found = self._held() if self._folder is None else self._mapped(self._folder)
         self._recordings = ()
         return found
 
@@ -83,17 +86,24 @@ class GatheredBlock:
             grids[row, first : first + len(cells)] = torch.from_numpy(cells)
         return grids
 
-    def _mapped(self) -> Tensor:
-        assert self._folder is not None
-        frame_bytes = self.shape[2] * self.shape[3]
-        file = unnamed_file(self._folder, self.shape[0] * self.shape[1] * frame_bytes)
+    def _mapped(self, folder: Path) -> Tensor:
+        file = unnamed_file(folder, math.prod(self.shape))
+        with ExitStack() as stack:
+            stack.callback(file.close)
+            self._write(file, folder)
+            found = _map(file, self.shape)
+            stack.pop_all()
+        self._file = file
+        weakref.finalize(self, file.close)
+        return found
+
+    def _write(self, file: BinaryIO, folder: Path) -> None:
+        _, frames, rows, columns = self.shape
         for row, first, cells in self._parts():
-            file.seek((row * self.shape[1] + first) * frame_bytes)
-            with writing(self._folder):
+            with writing(folder):
+                file.seek((row * frames + first) * rows * columns)
                 file.write(cells.data)
                 file.flush()
-        self._file = file
-        return _map(file, self.shape)
 
     def _parts(self) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
         first = 0
