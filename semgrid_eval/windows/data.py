@@ -190,7 +190,7 @@ def _window_set(
     data: GridData, inputs: Frames, targets: Frames, moves: _Moves, sensors: tuple[str, ...], *, translate: bool
 ) -> WindowSet:
     def put(values: NDArray[np.number[Any]], kind: type[np.number[Any]]) -> Tensor:
-        return torch.from_numpy(values.astype(kind)).to(data.device)
+        return torch.from_numpy(np.ascontiguousarray(values, kind)).to(data.device)
 
     return WindowSet(
         data=data,

@@ -58,8 +58,9 @@ class GridData:
         return self.block.device
 
     def to(self, device: torch.device) -> "GridData":
-        """Return the same data with its grids on another device."""
-        return self if device == self.device else replace(self, block=HeldBlock(self.grids.to(device)))
+        """Return the same data with its grids on a device, gathered if they were not yet."""
+        grids = self.grids
+        return self if device == self.device else replace(self, block=HeldBlock(grids.to(device)))
 
     @property
     def frame_counts(self) -> list[int]:
