@@ -177,7 +177,7 @@ def make_model(
         InputError: there is no such model, or the settings are not its own.
     """
     made = registry.find_model(model) if isinstance(model, str) else model
-    data, (rows, columns) = windows.data, windows.data.grids.shape[-2:]
+    data, (rows, columns) = windows.data, windows.data.size
     given = Given(windows.sensors, windows.inputs.shape[1], rows, columns, data.cell_m, windows.translate, data.classes)
     chosen = made.parse_settings(dict(settings or {}), path="settings")
     made.check(chosen, given)

@@ -5,6 +5,7 @@ import io
 import json
 import os
 import stat
+import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePath
@@ -31,16 +32,16 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
     Raises:
         InputError: the file cannot be written; errors of the block that are not about this file stay what they are.
     """
-    with _writing(path):
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         partial, output = _open_partial(path)
     try:
         with io.BufferedWriter(output) as stream:
             yield stream
             stream.flush()
-            with _writing(path):
+            with writing(path):
                 os.fsync(stream.fileno())
-            with _writing(path):
+            with writing(path):
                 partial.replace(path)
     finally:
         with suppress(OSError):  # it is gone after success, and its folder may have been removed
@@ -55,7 +56,7 @@ class _Output(io.FileIO):
         super().__init__(partial, "xb")
 
     def write(self, data: "ReadableBuffer", /) -> int:
-        with _writing(self._path):
+        with writing(self._path):
             return super().write(data)
 
 
@@ -69,7 +70,8 @@ def _open_partial(path: Path) -> tuple[Path, _Output]:
 
 
 @contextmanager
-def _writing(path: Path) -> Iterator[None]:
+def writing(path: Path) -> Iterator[None]:
+    """Turn an error of the system into one line that names what was to be written."""
     try:
         yield
     except OSError as error:
@@ -88,7 +90,7 @@ def locked(folder: Path, name: str = ".lock") -> Iterator[None]:
     """
     stream = None
     while stream is None:
-        with _writing(folder):
+        with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
             stream = (folder / name).open("ab")
         if not hold(stream.fileno()):  # whoever held it has removed it
@@ -109,13 +111,13 @@ def atomic_folder(path: Path) -> Iterator[Path]:
     Raises:
         InputError: the folder cannot be written to; errors of the block that name a file elsewhere stay what they are.
     """
-    with _writing(path):
+    with writing(path):
         path = path.resolve() if path.is_symlink() else path
         path.parent.mkdir(parents=True, exist_ok=True)
         restore(path)
     with _filling(path), held_folder(path) as partial:
         yield partial
-        with _writing(path):
+        with writing(path):
             put(partial, path)
 
 
@@ -129,6 +131,27 @@ def _filling(path: Path) -> Iterator[None]:
         if error.filename is None or os.fsdecode(error.filename).startswith(str(beside)):
             raise InputError(f"cannot be written: {_reason(error)}", path=path) from error
         raise
+
+
+def unnamed_file(folder: Path, size_bytes: int) -> BinaryIO:
+    """Open a file of so many bytes that has no name in a folder: it is gone when it is closed, or its process ends.
+
+    Raises:
+        InputError: the folder cannot be written to, or has not so much room.
+    """
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - whoever asked for it closes it
+    try:
+        # Where a system cannot take all of the room at once, writing says that it is not there.
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, size_bytes)
+        file.truncate(size_bytes)
+    except OSError as error:
+        file.close()
+        needed = f"{size_bytes / (1 << 30):.1f} GiB are needed there for a while"
+        raise InputError(f"cannot be written: {_reason(error)}; {needed}", path=folder) from error
+    return file
 
 
 def write_text(path: Path, text: str) -> None:

@@ -16,7 +16,14 @@ from semgrid_eval.files import digest_value
 from semgrid_eval.geometry import SE2
 from semgrid_eval.grids.actors import TrueActors
 from semgrid_eval.grids.rasterise import Cells, grid_of
-from semgrid_eval.grids.recording import FORMAT_VERSION, GridRecording, read_recordings, write_recordings
+from semgrid_eval.grids.recording import (
+    FORMAT_VERSION,
+    LAYOUT_VERSION,
+    GridRecording,
+    KeptRecording,
+    find_recordings,
+    write_recordings,
+)
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import EGO_MOTION
@@ -31,9 +38,9 @@ _log = logging.getLogger(__name__)
 
 @dataclass
 class GridDataSet:
-    """The grids of many logs; `failed` holds the reason for each log that gave none."""
+    """The grids of many logs, on disk; `failed` holds the reason for each log that gave none."""
 
-    recordings: list[GridRecording] = field(default_factory=list)
+    recordings: list[KeptRecording] = field(default_factory=list)
     failed: dict[str, str] = field(default_factory=dict)
     built: int = 0
     reused: int = 0
@@ -51,15 +58,15 @@ def build_grids(
     """Make the grids of all logs, or take those that lie in `folder` already, as many at once as `executor` works on.
 
     A log that fails is noted with its reason and the others go on. The order of recordings is that of `logs`. Grids of
-    all sensors are made; with `sensors`, only those of these and of the target are read into memory.
+    all sensors are made; with `sensors`, recordings have those of these and of the target. No cell stays in memory.
     """
     data = GridDataSet()
     remove_stale(folder)
-    ready: dict[Path, list[GridRecording]] = {}
+    ready: dict[Path, list[KeptRecording]] = {}
     missing: list[Path] = []
     for log in logs:
         try:
-            ready[log] = _only(_read(log, folder, config), sensors)
+            ready[log] = _only(_find(log, folder, config), sensors)
         except ResultError as error:
             missing.append(log)  # not made yet, or damaged
             if error.path and error.path.exists():
@@ -74,20 +81,18 @@ def build_grids(
         if failure is not None:
             data.failed[str(log)] = failure.reason if isinstance(failure, WorkerDied) else failure
             continue
-        # Workers leave their grids on disk: reading them costs less than sending them between processes.
-        ready[log] = _only(_read(log, folder, config), sensors)
+        ready[log] = _only(_find(log, folder, config), sensors)
         data.built += 1
     data.recordings = [recording for log in logs for recording in ready.get(log, [])]
     return data
 
 
-def _only(recordings: list[GridRecording], sensors: Sequence[str] | None) -> list[GridRecording]:
+def _only(recordings: list[KeptRecording], sensors: Sequence[str] | None) -> list[KeptRecording]:
     if sensors is None:
         return recordings
     first = recordings[0]
     kept = tuple(name for name in first.sensors if name in (*sensors, first.target))
-    rows = [first.sensors.index(name) for name in kept]
-    return [replace(recording, sensors=kept, grids=recording.grids[rows]) for recording in recordings]
+    return [replace(recording, sensors=kept) for recording in recordings]
 
 
 def build_log(log: Path, config: GridConfig) -> list[GridRecording]:
@@ -189,9 +194,9 @@ def _build_and_keep(log: Path, folder: Path, config: GridConfig) -> str | None:
     return None
 
 
-def _read(log: Path, folder: Path, config: GridConfig) -> list[GridRecording]:
+def _find(log: Path, folder: Path, config: GridConfig) -> list[KeptRecording]:
     kept = _kept(log, folder, config)
-    return read_recordings(kept.file, log, owner=kept.key, recovered=kept.recovered)
+    return find_recordings(kept.file, log, owner=kept.key, recovered=kept.recovered)
 
 
 class _Kept(NamedTuple):
@@ -209,8 +214,9 @@ def _kept(log: Path, folder: Path, config: GridConfig) -> _Kept:
 
 
 def grid_key(log_digest: str, config: GridConfig) -> str:
-    """Digest all that decides the grids of a log."""
-    return digest_value({"log": log_digest, "config": config.model_dump(mode="json"), "format": FORMAT_VERSION})
+    """Digest all that decides the grids of a log, and how they are kept."""
+    versions = [FORMAT_VERSION, LAYOUT_VERSION]
+    return digest_value({"log": log_digest, "config": config.model_dump(mode="json"), "format": versions})
 
 
 def grid_file(log: str, key: str) -> str:

@@ -88,7 +88,8 @@ def training_key(
 def draw_windows(count: int, needed: int, generator: torch.Generator) -> Tensor:
     """Draw window indices (needed,) at random; none comes again before all `count` were drawn."""
     rounds = math.ceil(needed / count)
-    return torch.cat([torch.randperm(count, generator=generator) for _ in range(rounds)])[:needed]
+    drawn = torch.cat([torch.randperm(count, generator=generator) for _ in range(rounds)])
+    return drawn[:needed].clone()  # without what is not needed
 
 
 class _Trainer:

@@ -19,6 +19,7 @@ from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.results import LogRecord
 from semgrid_eval.sources.benchmarks import published_fingerprints
 from semgrid_eval.windows.grids import GridData, stack_recordings
+from semgrid_eval.windows.storage import Storage
 
 
 class GridSource(Protocol):
@@ -45,7 +46,8 @@ class GridSource(Protocol):
 class RunData:
     """Grids of a folder of logs, made when a row first asks for them, kept in the folder `cache` and put on `device`.
 
-    `rows` are all rows of the matrix: they tell which sensors are needed.
+    On a CPU what windows are taken from is a file there that is mapped into memory. `rows` are all rows of the matrix:
+    they tell which sensors are needed.
     """
 
     def __init__(
@@ -53,7 +55,8 @@ class RunData:
     ) -> None:
         self._folder = logs
         self._logs = find_logs(logs)
-        self.cache, self._executor, self._device, self._stage = cache, executor, device, stage
+        self.cache, self._executor, self._stage = cache, executor, stage
+        self._storage = Storage(device, cache)
         self._configs = {grid_digest(row.grid): row.grid for row in rows}
         self._sensors = defaultdict[str, list[str]](list)
         for row in rows:
@@ -92,15 +95,17 @@ class RunData:
             chosen = [recording for recording in data_set.recordings if recording.split == split]
             if not chosen:
                 raise InputError(self._why_none(data_set, split))
-            sensors = list(dict.fromkeys(self._sensors[key[0]]))
-            stacked = stack_recordings(chosen, cell_m=config.spec.cell_m, classes=config.classes, sensors=sensors)
-            self._stacked[key] = stacked.to(self._device)
-            # They have their copy now.
-            data_set.recordings = [recording for recording in data_set.recordings if recording.split != split]
+            self._stacked[key] = stack_recordings(
+                chosen,
+                cell_m=config.spec.cell_m,
+                classes=config.classes,
+                sensors=list(dict.fromkeys(self._sensors[key[0]])),
+                storage=self._storage,
+            )
         return self._stacked[key]
 
     def grids(self, config: GridConfig) -> GridDataSet:
-        """Return the grids of all recordings, but for those of splits that were asked for by `data` before."""
+        """Return the grids of all recordings, on disk."""
         key = grid_digest(config)
         if key not in self._sets:
             with self._stage("grids") as progress:

@@ -10,17 +10,16 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
-import torch
-
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError, ResultError
-from semgrid_eval.grids.recording import GridRecording, read_recordings, write_recordings
+from semgrid_eval.grids.recording import KeptRecording, find_recordings, write_recordings
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.runs.data import RunData, grid_digest
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.results import LogRecord
 from semgrid_eval.seals import read_sealed_json, write_sealed_json
 from semgrid_eval.windows.grids import GridData, stack_recordings
+from semgrid_eval.windows.storage import Storage
 
 INDEX_FILE = "packed.json"
 _INDEX = "packed"  # owns the index, which has no id
@@ -54,14 +53,14 @@ def is_packed(folder: Path) -> bool:
 
 
 class PackedGrids:
-    """Packed grids on a device, in place of `RunData`; `rows` tell which sensors are needed.
+    """Packed grids in a storage, in place of `RunData`; `rows` tell which sensors are needed.
 
     Raises:
         InputError: the folder is damaged.
     """
 
-    def __init__(self, folder: Path, rows: Sequence[Row], device: torch.device) -> None:
-        self._folder, self._device = folder, device
+    def __init__(self, folder: Path, rows: Sequence[Row], storage: Storage) -> None:
+        self._folder, self._storage = folder, storage
         self.cache = None
         index = folder / INDEX_FILE
         self._index = parse_config(PackedIndex, read_sealed_json(index, _INDEX), path=index)
@@ -86,18 +85,21 @@ class PackedGrids:
         if grid_digest(config) != grid_digest(self._index.grid):
             raise InputError("holds grids that were made in another way than this row's", path=self._folder)
         if split not in self._stacked:
-            recordings = [each for log in self._index.logs if log.split == split for each in self._read(log)]
+            recordings = [each for log in self._index.logs if log.split == split for each in self._find(log)]
             if not recordings:
                 raise InputError(f"holds no recording of split {split!r}", path=self._folder)
-            stacked = stack_recordings(
-                recordings, cell_m=config.spec.cell_m, classes=config.classes, sensors=self._sensors
+            self._stacked[split] = stack_recordings(
+                recordings,
+                cell_m=config.spec.cell_m,
+                classes=config.classes,
+                sensors=self._sensors,
+                storage=self._storage,
             )
-            self._stacked[split] = stacked.to(self._device)
         return self._stacked[split]
 
-    def _read(self, log: LogRecord) -> list[GridRecording]:
+    def _find(self, log: LogRecord) -> list[KeptRecording]:
         file = _file(self._folder, log.path)
-        found = read_recordings(file, self._folder / log.path, owner=log.digest)
+        found = find_recordings(file, self._folder / log.path, owner=log.digest)
         if other := {recording.digest for recording in found} - {log.digest}:
             raise ResultError(f"holds the log {', '.join(other)}, not {log.digest}", path=file)
         self.log_of |= {recording.name: log.path for recording in found}

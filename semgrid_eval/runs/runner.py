@@ -29,6 +29,7 @@ from semgrid_eval.runs.truth import work_out
 from semgrid_eval.runs.worker import Worker, asks_of_truth
 from semgrid_eval.scores import results
 from semgrid_eval.windows.data import WindowSet
+from semgrid_eval.windows.storage import Storage
 from semgrid_eval.workplace import Limits
 
 
@@ -160,7 +161,7 @@ def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stag
 
     def made(folder: Path) -> GridSource:
         if is_packed(folder):
-            return PackedGrids(folder, matrix.rows, place)
+            return PackedGrids(folder, matrix.rows, Storage(place, options.grids))
         executor = options.grid_executor
         return RunData(folder, options.grids, matrix.rows, executor=executor, device=place, stage=stage)
 

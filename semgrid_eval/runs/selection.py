@@ -75,7 +75,7 @@ class Selection:
             leads = wanted.leads_frames or wanted_lead(wanted.config, grids)
             planned = wanted.plan(grids.frame_counts, wanted.config, leads)
             kept = wanted.recordings(grids.groups)
-            chosen = [window for window in planned.windows if window.recording in kept]
+            chosen = planned.windows[np.isin(planned.windows.recording, list(kept))]
             windows = select_windows(grids, chosen, sensors=row.sensors, translate=row.translate)
             too_short = {index: why for index, why in planned.too_short.items() if index in kept}
             self._selected[key] = windows, too_short

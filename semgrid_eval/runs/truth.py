@@ -75,7 +75,7 @@ def told(truth: Truth, windows: WindowSet, config: GridConfig, cache: Path | Non
             found = np.zeros((len(windows), *answer.shape[1:]), answer.dtype)
         found[chosen] = answer
     assert found is not None, "there are windows"
-    return torch.from_numpy(found).to(windows.data.grids.device)
+    return torch.from_numpy(found).to(windows.data.device)
 
 
 def expected_target(windows: WindowSet, config: GridConfig, cache: Path | None) -> NDArray[np.uint8] | None:

@@ -132,7 +132,7 @@ def answered(model: Model, seen: WindowBatch) -> Evaluation:
 
 
 def _usual_spec(windows: WindowSet) -> GridSpec:
-    rows, columns = windows.data.grids.shape[-2:]
+    rows, columns = windows.data.size
     cell_m = windows.data.cell_m
     return GridSpec(rows=rows, columns=columns, cell_m=cell_m, agent_row=rows, agent_column=columns // 2)
 

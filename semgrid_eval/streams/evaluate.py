@@ -66,7 +66,7 @@ def evaluate_stream(
         chosen = slice(start, start + batch)
         frames = plan.evaluated[chosen]
         prediction, certainty = predictions.at(plan.used[chosen], frames, move=move)
-        target = data.grids[data.sensor_index(data.target), torch.from_numpy(frames).to(data.grids.device)]
+        target = data.grids[data.sensor_index(data.target), torch.from_numpy(frames).to(data.device)]
         truth = target.cpu().numpy()
         masked = unseen.at(chosen)
         shown.evaluate(truth, masked)
@@ -93,7 +93,7 @@ class Unseen:
     """M at times of evaluation, worked out once for all rows of the same ones, a bit a cell."""
 
     def __init__(self, data: GridData, frames: NDArray[np.int64]) -> None:
-        self._size = data.grids.shape[-2:]
+        self._size = data.size
         parts = [unseen_truth(data, part) for part in np.array_split(frames, max(1, len(frames) // 64))]
         self._bits = np.packbits(np.concatenate(parts).reshape(len(frames), -1), axis=1)
 
@@ -109,13 +109,13 @@ def unseen_truth(data: GridData, frames: NDArray[np.int64]) -> NDArray[np.bool_]
     It is the same whatever a row sees, when and how late. What was seen is moved to the vehicle's place, like grids.
     """
     row = data.sensor_index(data.target)
-    found = np.zeros((len(frames), *data.grids.shape[-2:]), np.bool_)
+    found = np.zeros((len(frames), *data.size), np.bool_)
     for mask, frame, owner in zip(found, frames, data.locate(frames)[0], strict=True):
         first = int(data.first_frames[owner])
         moved_m = data.position_m[frame] - data.position_m[first : frame + 1]
         shift_cells = shift_in_cells(moved_m, data.cell_m)
-        near = np.flatnonzero((np.abs(shift_cells) < data.grids.shape[-2:]).all(axis=1))
-        seen = data.grids[row, torch.from_numpy(first + near).to(data.grids.device)] != UNKNOWN
+        near = np.flatnonzero((np.abs(shift_cells) < data.size).all(axis=1))
+        seen = data.grids[row, torch.from_numpy(first + near).to(data.device)] != UNKNOWN
         shifts = torch.from_numpy(shift_cells[near]).to(seen.device)
         known = shift_grids(seen.to(torch.uint8), shifts).amax(dim=0)
         mask[:] = ((known > 0) & (data.grids[row, frame] == UNKNOWN)).cpu().numpy()
@@ -133,7 +133,7 @@ class _Predictions:
 
     def at(self, used: NDArray[np.int64], frames: NDArray[np.int64], *, move: bool) -> tuple[Grids, Grids]:
         """Return class ids and certainty (E, H, W) of the answers used at some frames; all unknown where none is."""
-        size = self._plan.answers.data.grids.shape[-2:]
+        size = self._plan.answers.data.size
         prediction, certainty = (np.zeros((len(used), *size), np.uint8) for _ in range(2))
         there = used != NONE
         if there.any():

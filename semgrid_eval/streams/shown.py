@@ -18,7 +18,7 @@ class FirstRecording:
         self._plan, self._owner = plan, int(owners[0])
         self._evaluations = int((owners == owners[0]).sum())
         self._answers = int(plan.used[: self._evaluations].max()) + 1
-        nothing = np.zeros((0, *plan.answers.data.grids.shape[-2:]), np.uint8)
+        nothing = np.zeros((0, *plan.answers.data.size), np.uint8)
         self._parts = {name: [nothing] for name in ("prediction", "certainty", "target", "mask")}
 
     def answer(self, prediction: NDArray[np.uint8], certainty: NDArray[np.uint8]) -> None:

@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import torch
@@ -15,7 +15,11 @@ from semgrid_eval.files import DIGEST_CHARACTERS
 from semgrid_eval.grids.spec import GridSpec
 from semgrid_eval.windows.disturb.disturbance import Disturbance, Inputs
 from semgrid_eval.windows.grids import GridData, covered_without_truth, shift_grids, shift_in_cells
-from semgrid_eval.windows.plan import Window
+from semgrid_eval.windows.plan import Windows
+
+Frames = NDArray[np.int32] | NDArray[np.int64]
+"""Indices along F."""
+_PART = 1 << 18  # windows that are looked at together, where all of them would take much memory
 
 
 @dataclass(frozen=True)
@@ -53,10 +57,10 @@ class Disturb:
             data=windows.data,
             spec=self.spec,
             sensor_rows=windows.sensor_rows,
-            frames=windows.inputs[chosen].cpu().numpy(),
-            target_frames=windows.target_frames[chosen].cpu().numpy(),
+            frames=windows.inputs[chosen].long().cpu().numpy(),
+            target_frames=windows.target_frames[chosen].long().cpu().numpy(),
             grids=grids,
-            shift_cells=windows.shift_cells[chosen],
+            shift_cells=windows.shift_cells[chosen].long(),
             lead_s=windows.lead_s[chosen],
         )
         found = self.how.apply(inputs)
@@ -71,9 +75,9 @@ class WindowSet:
     sensors: tuple[str, ...]
     sensor_rows: Tensor  # (S,) int64 where the input sensors lie in the data
     translate: bool  # whether inputs are moved into the target's place
-    inputs: Tensor  # (N, T) int64
-    target_frames: Tensor  # (N,) int64
-    shift_cells: Tensor  # (N, T, 2) int64
+    inputs: Tensor  # (N, T) int32: there may be millions of windows
+    target_frames: Tensor  # (N,) int32
+    shift_cells: Tensor  # (N, T, 2) int32
     lead_s: Tensor  # (N, T) float32
     disturb: Disturb | None = None  # what is wrong with the inputs that a model sees; M and targets never change
     truth: Tensor | None = None  # (N, ...) what of the truth is told; nothing but for a model that asks
@@ -91,10 +95,10 @@ class WindowSet:
 
     def batch(self, chosen: Tensor | slice) -> WindowBatch:
         """Gather the chosen windows: (B,) int64 or a slice."""
-        shift_cells, lead_s = self.shift_cells[chosen], self.lead_s[chosen]
-        seen = self.data.grids[self.sensor_rows[None, :, None], self.inputs[chosen][:, None, :]]
+        shift_cells, lead_s = self.shift_cells[chosen].long(), self.lead_s[chosen]
+        seen = self.data.grids[self.sensor_rows[None, :, None], self.inputs[chosen][:, None, :].long()]
         aligned = shift_grids(seen, shift_cells[:, None])
-        target = self.data.grids[self.data.sensor_index(self.data.target), self.target_frames[chosen]]
+        target = self.data.grids[self.data.sensor_index(self.data.target), self.target_frames[chosen].long()]
         mask = covered_without_truth(aligned, target)
         if self.disturb:
             seen, shift_cells, lead_s = self.disturb(self, chosen, seen)
@@ -130,53 +134,73 @@ class WindowSet:
         total = hashlib.sha256(repr((self.data.digests, self.data.cell_m, self.sensors, self.translate)).encode())
         if self.disturb:
             total.update(self.disturb.how.model_dump_json().encode())
-        for part in (self.inputs, self.target_frames):
-            total.update(repr(tuple(part.shape)).encode() + part.cpu().numpy().tobytes())
+        for frames in (self.inputs, self.target_frames):
+            total.update(repr(tuple(frames.shape)).encode())
+            for part in torch.split(frames, _PART):
+                total.update(part.cpu().numpy().astype(np.int64).tobytes())
         return total.hexdigest()[:DIGEST_CHARACTERS]
 
 
 class Targets(NamedTuple):
     """What N windows are to predict: a frame along F, where the vehicle is, and when."""
 
-    frames: NDArray[np.int64]  # (N,) where a target lies between frames, one beside it
+    frames: Frames  # (N,) where a target lies between frames, one beside it
     position_m: NDArray[np.float64]  # (N, 2)
     stamps_ns: NDArray[np.int64]  # (N,)
 
 
-def select_windows(
-    data: GridData, windows: Sequence[Window], *, sensors: Sequence[str], translate: bool = True
-) -> WindowSet:
-    """Resolve planned windows of equal shape against grid data, input grids coming from `sensors`.
+def select_windows(data: GridData, windows: Windows, *, sensors: Sequence[str], translate: bool = True) -> WindowSet:
+    """Resolve planned windows against grid data, input grids coming from `sensors`.
 
     Raises:
         InputError: there is no window, or a sensor does not exist.
     """
-    if not windows:
+    if not len(windows):
         raise InputError("there are no windows")
-    recording = np.array([window.recording for window in windows])
-    frames = np.array([(*window.input_frames, window.target_frame) for window in windows])
-    frames += data.first_frames[recording][:, None]
-    inputs, target = frames[:, :-1], frames[:, -1]
-    at = Targets(target, data.position_m[target], data.stamps_ns[target])
-    return windows_at(data, inputs, at, sensors=sensors, translate=translate)
+    frames = windows.frames + data.first_frames.astype(np.int32)[windows.recording][:, None]
+    parts = []
+    for start in range(0, len(frames), _PART):
+        inputs, target = frames[start : start + _PART, :-1], frames[start : start + _PART, -1]
+        parts.append(_moves(data, inputs, Targets(target, data.position_m[target], data.stamps_ns[target])))
+    moves = _Moves(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    return _window_set(data, frames[:, :-1], frames[:, -1], moves, tuple(sensors), translate=translate)
 
 
 def windows_at(
-    data: GridData, inputs: NDArray[np.int64], at: Targets, *, sensors: Sequence[str], translate: bool = True
+    data: GridData, inputs: Frames, at: Targets, *, sensors: Sequence[str], translate: bool = True
 ) -> WindowSet:
     """Resolve windows whose inputs (N, T) are frames along F, and whose targets may lie between frames."""
+    return _window_set(data, inputs, at.frames, _moves(data, inputs, at), tuple(sensors), translate=translate)
+
+
+class _Moves(NamedTuple):
+    """How inputs come into their targets' places, and how long before them they were seen."""
+
+    shift_cells: NDArray[np.int32]  # (N, T, 2)
+    lead_s: NDArray[np.float32]  # (N, T)
+
+
+def _moves(data: GridData, inputs: Frames, at: Targets) -> _Moves:
     moved_m = at.position_m[:, None] - data.position_m[inputs]
     lead_ns = at.stamps_ns[:, None] - data.stamps_ns[inputs]
-    device = data.grids.device
+    return _Moves(shift_in_cells(moved_m, data.cell_m).astype(np.int32), (lead_ns * 1e-9).astype(np.float32))
+
+
+def _window_set(
+    data: GridData, inputs: Frames, targets: Frames, moves: _Moves, sensors: tuple[str, ...], *, translate: bool
+) -> WindowSet:
+    def put(values: NDArray[np.number[Any]], kind: type[np.number[Any]]) -> Tensor:
+        return torch.from_numpy(np.ascontiguousarray(values, kind)).to(data.device)
+
     return WindowSet(
         data=data,
-        sensors=tuple(sensors),
-        sensor_rows=torch.tensor([data.sensor_index(name) for name in sensors], device=device),
+        sensors=sensors,
+        sensor_rows=torch.tensor([data.sensor_index(name) for name in sensors], device=data.device),
         translate=translate,
-        inputs=torch.from_numpy(inputs.copy()).to(device),
-        target_frames=torch.from_numpy(at.frames.copy()).to(device),
-        shift_cells=torch.from_numpy(shift_in_cells(moved_m, data.cell_m)).to(device),
-        lead_s=torch.from_numpy((lead_ns * 1e-9).astype(np.float32)).to(device),
+        inputs=put(inputs, np.int32),
+        target_frames=put(targets, np.int32),
+        shift_cells=put(moves.shift_cells, np.int32),
+        lead_s=put(moves.lead_s, np.float32),
     )
 
 

@@ -1,7 +1,8 @@
-"""The grids of all recordings in one block of memory, moved by the ego motion (T2), and the mask M."""
+"""The grids of all recordings in one block, moved by the ego motion (T2), and the mask M."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +12,11 @@ from torch import Tensor
 
 from semgrid_eval.classes import DEFAULT_CLASSES, UNKNOWN, ClassSet
 from semgrid_eval.errors import InputError
+from semgrid_eval.windows.actors import ActorFlags
+from semgrid_eval.windows.storage import Block, GatheredBlock, HeldBlock, Storage
 
 if TYPE_CHECKING:  # building grids needs the log readers; using built ones does not
-    from semgrid_eval.grids.recording import GridRecording
+    from semgrid_eval.grids.recording import RecordingGrids
 
 # How long an actor's footprints stay near a target. That holds all ghosts that rows of the paper can leave: five
 # inputs, or a horizon three steps longer, reach back 25 frames, 1.47 s.
@@ -24,7 +27,7 @@ GHOST_S = 1.5
 class GridData:
     """The grids of all recordings on one device, recordings one after the other along F."""
 
-    grids: Tensor  # (S, F, H, W) uint8 class ids
+    block: Block  # (S, F, H, W) class ids, gathered when they are first asked for
     sensors: tuple[str, ...]  # names along S
     target: str  # which of them the targets come from
     recordings: tuple[str, ...]  # names of the recordings
@@ -36,14 +39,28 @@ class GridData:
     position_m: NDArray[np.float64]  # (F, 2) forward and left in the grid orientation of the frame's own recording
     yaw_rad: NDArray[np.float64]  # (F,) heading in that orientation
     cell_m: float  # edge of a cell
-    # For each recording (its F, H, W) flags of true actors, None where its log does not hold the truth. They stay on
-    # the host: scores are split by them, and nothing is predicted from them.
-    actors: tuple[NDArray[np.uint8] | None, ...] = ()
+    actors: ActorFlags  # of true actors, on the host: scores are split by them, and nothing is predicted from them
     classes: ClassSet = DEFAULT_CLASSES  # of the grids' cells
 
+    @property
+    def grids(self) -> Tensor:
+        """Return the class ids (S, F, H, W) uint8."""
+        return self.block.tensor
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Rows and columns of a grid."""
+        return self.block.shape[2:]
+
+    @property
+    def device(self) -> torch.device:
+        """Where the class ids lie."""
+        return self.block.device
+
     def to(self, device: torch.device) -> "GridData":
-        """Return the same data with its grids on another device."""
-        return replace(self, grids=self.grids.to(device))
+        """Return the same data with its grids on a device, gathered if they were not yet."""
+        grids = self.grids
+        return self if device == self.device else replace(self, block=HeldBlock(grids.to(device)))
 
     @property
     def frame_counts(self) -> list[int]:
@@ -65,19 +82,24 @@ class GridData:
         Args:
             target_frames: (N,) indices along F.
         """
-        if all(flags is None for flags in self.actors):
+        if not any(self.actors.known):
             return None
-        found = np.zeros((len(target_frames), *self.grids.shape[-2:]), np.uint8)
+        found = np.zeros((len(target_frames), *self.size), np.uint8)
         for result, target, owner in zip(found, target_frames, self.locate(target_frames)[0], strict=True):
-            if (flags := self.actors[owner]) is not None:
-                begin = self.first_frames[owner]
-                age_s = (self.stamps_ns[target] - self.stamps_ns[begin : target + 1]) * 1e-9
-                first = begin + int(np.argmax(age_s <= GHOST_S))
-                moved_m = self.position_m[target] - self.position_m[first : target + 1]
-                shift_cells = torch.from_numpy(shift_in_cells(moved_m, self.cell_m))
-                seen = torch.from_numpy(flags[first - begin : target + 1 - begin])
-                np.bitwise_or.reduce(shift_grids(seen, shift_cells).numpy(), axis=0, out=result)
+            if self.actors.known[owner]:
+                near = self.actors.near(int(target), partial(self._actors_near, int(target), int(owner)))
+                result[:] = near.reshape(self.size)
         return found
+
+    def _actors_near(self, target: int, owner: int) -> NDArray[np.uint8]:
+        begin = self.first_frames[owner]
+        age_s = (self.stamps_ns[target] - self.stamps_ns[begin : target + 1]) * 1e-9
+        first = begin + int(np.argmax(age_s <= GHOST_S))
+        moved_m = self.position_m[target] - self.position_m[first : target + 1]
+        shift_cells = torch.from_numpy(shift_in_cells(moved_m, self.cell_m))
+        seen = torch.from_numpy(self.actors.of(owner)[first - begin : target + 1 - begin])
+        near: NDArray[np.uint8] = np.bitwise_or.reduce(shift_grids(seen, shift_cells).numpy(), axis=0)
+        return near
 
     def sensor_index(self, name: str) -> int:
         """Find a sensor.
@@ -91,15 +113,17 @@ class GridData:
 
 
 def stack_recordings(
-    recordings: Sequence["GridRecording"],
+    recordings: Sequence["RecordingGrids"],
     *,
     cell_m: float,
     classes: ClassSet = DEFAULT_CLASSES,
     sensors: Sequence[str] | None = None,
+    storage: Storage | None = None,
 ) -> GridData:
-    """Put recordings into one block of memory; `sensors` limits it to those and the target's (default: all).
+    """Put recordings into one block; `sensors` limits it to those and the target's (default: all).
 
-    Edge of a cell and classes are those of the configuration by which the grids were made.
+    Edge of a cell and classes are those of the configuration by which the grids were made. The block is in memory
+    unless a `storage` is given.
 
     Raises:
         InputError: there is no recording, or one lacks a sensor or has grids of another size.
@@ -108,38 +132,32 @@ def stack_recordings(
         raise InputError("there are no grids to take windows from")
     target = recordings[0].target
     kept = tuple(dict.fromkeys([*(sensors or recordings[0].sensors), target]))
-    size = recordings[0].grids.shape[-2:]
-    first_frames = np.concatenate([[0], np.cumsum([len(entry.stamps_ns) for entry in recordings])]).astype(np.int64)
-    grids = torch.empty((len(kept), int(first_frames[-1]), *size), dtype=torch.uint8)
-    for entry, first in zip(recordings, first_frames, strict=False):
-        _check_recording(entry, kept, size)
-        for row, name in enumerate(kept):
-            source = np.ascontiguousarray(entry.grids[entry.sensors.index(name)])
-            grids[row, first : first + len(source)] = torch.from_numpy(source)
+    for entry in recordings:
+        _check_recording(entry, kept, recordings[0].size)
     return GridData(
-        grids=grids,
+        block=GatheredBlock(recordings, kept, storage or Storage(torch.device("cpu"))),
         sensors=kept,
         target=target,
         recordings=tuple(entry.name for entry in recordings),
         logs=tuple(entry.log for entry in recordings),
         digests=tuple(entry.digest for entry in recordings),
         groups=tuple(entry.group for entry in recordings),
-        first_frames=first_frames,
+        first_frames=np.cumsum([0, *(len(entry.stamps_ns) for entry in recordings)], dtype=np.int64),
         stamps_ns=np.concatenate([entry.stamps_ns for entry in recordings]),
         position_m=np.concatenate([entry.position_m for entry in recordings]),
         yaw_rad=np.concatenate([entry.yaw_rad for entry in recordings]),
         cell_m=cell_m,
-        actors=tuple(entry.actors for entry in recordings),
+        actors=ActorFlags(recordings),
         classes=classes,
     )
 
 
-def _check_recording(entry: "GridRecording", sensors: tuple[str, ...], size: tuple[int, ...]) -> None:
+def _check_recording(entry: "RecordingGrids", sensors: tuple[str, ...], size: tuple[int, int]) -> None:
     for name in sensors:
         if name not in entry.sensors:
             raise InputError(f"the grids of {entry.name} have no sensor {name!r}, only {', '.join(entry.sensors)}")
-    if entry.grids.shape[-2:] != size:
-        raise InputError(f"the grids of {entry.name} are {entry.grids.shape[-2:]}, and the first ones are {size}")
+    if entry.size != size:
+        raise InputError(f"the grids of {entry.name} are {entry.size}, and the first ones are {size}")
 
 
 def shift_in_cells(moved_m: NDArray[np.float64], cell_m: float) -> NDArray[np.int64]:

@@ -5,11 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
 from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
 from semgrid_eval.windows.lead import LONGEST_LEAD_MS, lead_from
+
+Indices = NDArray[np.int32]
 
 
 class TooEarlyError(InputError):
@@ -43,10 +47,10 @@ class WindowConfig(Config):
         """Frames from the first input to the target."""
         return self.span_frames + self.lead_frames
 
-    def input_frames(self, target: int, lead_frames: int) -> tuple[int, ...]:
-        """Return the frames of the inputs, oldest first, the newest so many frames before the target."""
+    def frames(self, target: int, lead_frames: int) -> list[int]:
+        """Return the frames of the inputs, oldest first, the newest so many frames before the target, and its own."""
         newest = target - lead_frames
-        return tuple(range(newest - self.span_frames, newest + 1, self.step_frames))
+        return [*range(newest - self.span_frames, newest + 1, self.step_frames), target]
 
     @model_validator(mode="after")
     def _inputs_lie_in_recording(self) -> Self:
@@ -60,20 +64,25 @@ class WindowConfig(Config):
         return self
 
 
-@dataclass(frozen=True)
-class Window:
-    """One sample: the index of its recording and the frames there, inputs from the oldest to the newest."""
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """N samples: the index of each one's recording and the frames there, inputs from the oldest to the newest."""
 
-    recording: int
-    input_frames: tuple[int, ...]
-    target_frame: int
+    recording: Indices  # (N,)
+    frames: Indices  # (N, T + 1) of the inputs, then of the target
+
+    def __len__(self) -> int:
+        return len(self.recording)
+
+    def __getitem__(self, chosen: NDArray[np.bool_] | NDArray[np.int64] | slice) -> "Windows":
+        return Windows(self.recording[chosen], self.frames[chosen])
 
 
 @dataclass(frozen=True)
 class WindowPlan:
     """The windows of some recordings, and the reason for each recording (by its index) that is too short for one."""
 
-    windows: tuple[Window, ...]
+    windows: Windows
     too_short: dict[int, str]
 
 
@@ -112,28 +121,34 @@ def validation_windows(
             f"{target} is too early: inputs and lead reach back {reach} frames; null takes every target that there is"
         )
         raise TooEarlyError(fault, field="window.target_frame")
-    found = [
-        Window(recording, config.input_frames(target, leads[recording % len(leads)]), target)
-        for recording, count in enumerate(frame_counts)
-        if target < count
-    ]
-    return _plan(frame_counts, found, target + 1)
+    recordings = np.flatnonzero(np.array(frame_counts) > target)
+    frames = np.array([config.frames(target, lead) for lead in leads], np.int32)
+    return _plan(frame_counts, Windows(recordings.astype(np.int32), frames[recordings % len(leads)]), target + 1)
 
 
 def _every_target(
     frame_counts: Sequence[int], config: WindowConfig, leads: Sequence[Sequence[int]], shortest: int
 ) -> WindowPlan:
     """Plan the windows of every target for the leads of each recording; `shortest` is the least lead of all."""
-    found = [
-        Window(recording, config.input_frames(target, lead), target)
-        for recording, (count, each) in enumerate(zip(frame_counts, leads, strict=True))
-        for lead in each
-        for target in range(config.span_frames + lead, count)
-    ]
-    return _plan(frame_counts, found, config.span_frames + shortest + 1)
+    # Recordings are alike: what has as many frames, and the same leads, shares its table.
+    tables: dict[tuple[int, ...], Indices] = {}
+    for count, each in zip(frame_counts, leads, strict=True):
+        if (count, *each) not in tables:
+            tables[count, *each] = _frames(count, config, each)
+    found = [tables[count, *each] for count, each in zip(frame_counts, leads, strict=True)]
+    recording = np.repeat(np.arange(len(found), dtype=np.int32), np.array([len(table) for table in found], int))
+    windows = Windows(recording, np.concatenate([_frames(0, config, ()), *found]))
+    return _plan(frame_counts, windows, config.span_frames + shortest + 1)
 
 
-def _plan(frame_counts: Sequence[int], windows: Sequence[Window], needed: int) -> WindowPlan:
+def _frames(count: int, config: WindowConfig, leads: Sequence[int]) -> Indices:
+    """List the frames of the windows of a recording with so many: -> (N, T + 1)."""
+    targets = [(target, lead) for lead in leads for target in range(config.span_frames + lead, count)]
+    found = [config.frames(target, lead) for target, lead in targets]
+    return np.array(found, np.int32).reshape(-1, config.inputs + 1)
+
+
+def _plan(frame_counts: Sequence[int], windows: Windows, needed: int) -> WindowPlan:
     too_short = {
         recording: f"has {count} frames, and a window needs {needed}"
         for recording, count in enumerate(frame_counts)
@@ -144,4 +159,4 @@ def _plan(frame_counts: Sequence[int], windows: Sequence[Window], needed: int) -
         raise InputError(
             f"a window needs {needed} frames, and the longest of {len(too_short)} recordings has {longest}"
         )
-    return WindowPlan(tuple(windows), too_short)
+    return WindowPlan(windows, too_short)

@@ -151,9 +151,9 @@ def test_truth_is_kept_with_the_grids(tmp_path):
     write_log(street(1, frames=2).recording("bare"), logs[1])
     first, again = (build_grids(logs, tmp_path / "grids", GridConfig()) for _ in range(2))
     assert again.reused == 2
-    np.testing.assert_array_equal(first.recordings[0].actors, again.recordings[0].actors)
-    assert set(np.unique(again.recordings[0].actors)) == {0, MOVING}
-    assert again.recordings[1].actors is None
+    np.testing.assert_array_equal(first.recordings[0].flags(), again.recordings[0].flags())
+    assert set(np.unique(again.recordings[0].flags())) == {0, MOVING}
+    assert not again.recordings[1].has_truth
 
 
 def test_truth_that_is_not_finite_is_named(tmp_path):

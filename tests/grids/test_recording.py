@@ -7,7 +7,7 @@ from support.recordings import random_recording
 
 from semgrid_eval.arrays import read_arrays, write_arrays
 from semgrid_eval.errors import ResultError
-from semgrid_eval.grids.recording import GridRecording, read_recordings, write_recordings
+from semgrid_eval.grids.recording import RecordingGrids, find_recordings, write_recordings
 
 
 def stretches():
@@ -20,12 +20,16 @@ def stretches():
 def test_stretches_come_back_as_they_were(tmp_path):
     written = stretches()
     write_recordings(tmp_path / "kept.npz", written, owner="d")
-    found = read_recordings(tmp_path / "kept.npz", Path("here.mcap"), owner="d")
+    found = find_recordings(tmp_path / "kept.npz", Path("here.mcap"), owner="d")
     assert len(found) == 3
     for one, same in zip(written, found, strict=True):
-        for name in GridRecording.__dataclass_fields__:
+        for name in (*RecordingGrids.__dataclass_fields__, "size", "has_truth"):
             np.testing.assert_array_equal(getattr(one, name), getattr(same, name), err_msg=name)
-    assert [recording.actors is None for recording in found] == [False, True, False]
+        for sensor in one.sensors:
+            np.testing.assert_array_equal(one.cells(sensor), same.cells(sensor))
+        if one.has_truth:
+            np.testing.assert_array_equal(one.flags(), same.flags())
+    assert [recording.has_truth for recording in found] == [True, False, True]
 
 
 def test_a_file_that_lacks_an_array_is_refused(tmp_path):
@@ -33,10 +37,10 @@ def test_a_file_that_lacks_an_array_is_refused(tmp_path):
     arrays = read_arrays(tmp_path / "kept.npz", ("log", "sensors", "names", "frames", "stamps_ns"))
     write_arrays(tmp_path / "kept.npz", arrays, owner="d")
     with pytest.raises(ResultError, match="has no array has_checksums"):
-        read_recordings(tmp_path / "kept.npz", Path("here.mcap"), owner="d")
+        find_recordings(tmp_path / "kept.npz", Path("here.mcap"), owner="d")
 
 
 def test_a_file_of_another_owner_is_refused(tmp_path):
     write_recordings(tmp_path / "kept.npz", stretches(), owner="e")
     with pytest.raises(ResultError, match=r"kept\.npz: belongs to another id \(e, not d\)"):
-        read_recordings(tmp_path / "kept.npz", Path("here.mcap"), owner="d")
+        find_recordings(tmp_path / "kept.npz", Path("here.mcap"), owner="d")

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field
 from support.models import network
+from support.planned import planned
 from support.recordings import random_recording
 from torch.nn import functional as F
 
@@ -26,7 +27,6 @@ from semgrid_eval.models.network import (
 )
 from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
-from semgrid_eval.windows.plan import Window
 
 GRIDS = torch.randint(0, CLASS_COUNT, (2, 3, 8, 8), generator=torch.Generator().manual_seed(0), dtype=torch.uint8)
 
@@ -44,7 +44,7 @@ def test_planes_put_each_grids_classes_side_by_side_in_what_layers_compute_in():
 @pytest.mark.parametrize("precision", ["float32", "bf16"])
 def test_a_network_predicts_probabilities(precision):
     data = stack_recordings([random_recording(0)], cell_m=0.5)
-    batch = select_windows(data, [Window(0, (0, 5), 10)], sensors=["full"]).batch(slice(0, 1))
+    batch = select_windows(data, planned((0, (0, 5), 10)), sensors=["full"]).batch(slice(0, 1))
     net = network(EncoderDecoder, depth=2, features=4, training={"precision": precision}).eval()
     scores = net.predict(batch)
     assert scores.dtype == torch.float32

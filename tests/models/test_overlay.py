@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.models import given as given_by
 from support.models import made
+from support.planned import planned
 from support.recordings import recording
 
 from semgrid_eval.errors import ConfigError
@@ -14,7 +15,6 @@ from semgrid_eval.models.newest import RepeatNewest
 from semgrid_eval.models.overlay import FuseAll, OverlaySensors, overlay
 from semgrid_eval.windows.data import WindowBatch, select_windows
 from semgrid_eval.windows.grids import stack_recordings
-from semgrid_eval.windows.plan import Window
 
 UPPER, LOWER = "split1_upper", "split1_lower"
 
@@ -53,7 +53,7 @@ def test_translating_row_aligns_what_is_repeated():
     grids[0, :, 2, 2] = 6
     data = stack_recordings([recording(grids, position_m=[[0, 0], [1, 0], [3, -1]])], cell_m=1.0)
     for translate, cell in ((True, (4, 1)), (False, (2, 2))):
-        windows = select_windows(data, [Window(0, (0, 1), 2)], sensors=["full"], translate=translate)
+        windows = select_windows(data, planned((0, (0, 1), 2)), sensors=["full"], translate=translate)
         assert made(RepeatNewest).predict(windows.batch(slice(0, 1))).argmax(dim=1)[0].nonzero().tolist() == [
             list(cell)
         ]

@@ -5,6 +5,7 @@ import importlib.metadata
 import pytest
 import torch
 from support.models import made, network
+from support.planned import planned
 from support.recordings import random_recording
 
 from semgrid_eval.config import Config
@@ -14,7 +15,6 @@ from semgrid_eval.models.network import Network
 from semgrid_eval.models.registry import ENTRY_POINT_GROUP, find_model, is_named, own_models, version_of
 from semgrid_eval.windows.data import select_windows
 from semgrid_eval.windows.grids import stack_recordings
-from semgrid_eval.windows.plan import Window
 
 OWN_MODELS = """
 import torch
@@ -103,7 +103,7 @@ def here():
 @pytest.fixture
 def batch():
     data = stack_recordings([random_recording(0)], cell_m=0.5)
-    return select_windows(data, [Window(0, (0, 5), 10), Window(0, (1, 6), 11)], sensors=["full"]).batch(slice(None))
+    return select_windows(data, planned((0, (0, 5), 10), (0, (1, 6), 11)), sensors=["full"]).batch(slice(None))
 
 
 @pytest.fixture

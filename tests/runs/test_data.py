@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 import torch
+from support.mapped import NEEDS_PROC, file_of
 from support.toy_world import street
 
 from semgrid_eval.executors import InProcess
@@ -51,3 +52,13 @@ def test_a_log_that_was_recovered_says_what_it_lost(logs, tmp_path):
     told = {path: record.recovered for path, record in found.records.items()}
     assert told["val/whole.mcap"] == ""
     assert told["val/saved.mcap"].startswith("was recovered from a damaged log, of which ")
+
+
+@NEEDS_PROC
+def test_on_a_cpu_no_grid_stays_in_anonymous_memory(logs, tmp_path):
+    found = data_of(logs, tmp_path / "cache")
+    found.prepare()
+    config = load_matrix("baselines").rows[0].grid
+    data = found.data(config, "val")
+    assert not any(hasattr(recording, "grids") for recording in found.grids(config).recordings)
+    assert file_of(data.grids).startswith(str(tmp_path / "cache"))

@@ -9,7 +9,7 @@ from support.small_runs import run, write_logs
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import InProcess, Processes
-from semgrid_eval.grids.recording import read_recordings, write_recordings
+from semgrid_eval.grids.recording import find_recordings, write_recordings
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.progress import silent_stage
 from semgrid_eval.runs.data import RunData
@@ -17,6 +17,7 @@ from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.packed import INDEX_FILE, PackedGrids, pack_grids
 from semgrid_eval.scores import results
 from semgrid_eval.scores.sums import read_sums
+from semgrid_eval.windows.storage import Storage
 
 SPLIT = ["split2_upper", "split2_lower"]
 ROWS = [
@@ -100,10 +101,14 @@ def test_grids_of_another_log_are_refused(named, tmp_path):
 def test_grids_whose_recordings_are_of_another_log_than_their_seal_says_are_refused(named, tmp_path):
     packed = shutil.copytree(named, tmp_path / "packed")
     one, other = (
-        next(log.digest for log in PackedGrids(packed, [], torch.device("cpu")).records.values() if log.name == name)
+        next(
+            log.digest
+            for log in PackedGrids(packed, [], Storage(torch.device("cpu"))).records.values()
+            if log.name == name
+        )
         for name in ("a-1", "b-1")
     )
-    recordings = read_recordings(packed / "train" / "b-1.npz", packed, owner=other)
+    recordings = find_recordings(packed / "train" / "b-1.npz", packed, owner=other)
     write_recordings(packed / "val" / "a-1.npz", recordings, owner=one)
     (row,) = run([{"name": "BL", "model": "newest"}], packed, tmp_path / "run").rows
     assert row.failure.endswith(f"a-1.npz: holds the log {other}, not {one}")

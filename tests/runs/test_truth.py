@@ -9,6 +9,7 @@ import pytest
 import torch
 import yaml
 from support.drawn_again import write_town_like
+from support.planned import planned
 from support.small_runs import WINDOW, run, write_logs
 
 from semgrid_eval.executors import Processes
@@ -202,13 +203,14 @@ def test_answers_stand_at_their_windows_whatever_the_order_of_logs(logs, tmp_pat
     from semgrid_eval.executors import InProcess
     from semgrid_eval.progress import silent_stage
     from semgrid_eval.windows.data import select_windows
-    from semgrid_eval.windows.plan import Window, WindowConfig
+    from semgrid_eval.windows.plan import WindowConfig
 
     row = Row(name="x", model="newest", window=WindowConfig(step_frames=3, target_frame=8))
     data = RunData(logs, tmp_path, [row], executor=InProcess(), device=torch.device("cpu"), stage=silent_stage)
     grids = data.data(row.grid, "val")
-    windows = [Window(1, (2, 5), 8), Window(0, (2, 5), 8), Window(1, (1, 4), 7)]
-    chosen = [select_windows(grids, [windows[i] for i in order], sensors=("full",)) for order in ((0, 1, 2), (2, 0, 1))]
+    windows = planned((1, (2, 5), 8), (0, (2, 5), 8), (1, (1, 4), 7))
+    orders = (np.array([0, 1, 2]), np.array([2, 0, 1]))
+    chosen = [select_windows(grids, windows[order], sensors=("full",)) for order in orders]
     one, other = (told(Draws(2, continued=True), each, row.grid, tmp_path) for each in chosen)
     assert torch.equal(one[[2, 0, 1]], other)
     assert not torch.equal(one[0], one[1])

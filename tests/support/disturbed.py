@@ -1,6 +1,7 @@
 """Windows of small grids whose inputs are disturbed."""
 
 import numpy as np
+from support.planned import planned
 from support.recordings import recording
 
 from semgrid_eval.config import parse_config
@@ -8,7 +9,6 @@ from semgrid_eval.grids.spec import GridSpec
 from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.disturb.kinds import KINDS
 from semgrid_eval.windows.grids import stack_recordings
-from semgrid_eval.windows.plan import Window
 
 SIDE = 9
 SPEC = GridSpec(rows=SIDE, columns=SIDE, cell_m=1.0, agent_row=SIDE, agent_column=4)
@@ -22,7 +22,7 @@ def settings(*, kind, **disturb):
 def windows_of(recordings, windows, *, spec=SPEC, translate=True, sensors=("full",)) -> WindowSet:
     """Select windows given as (recording, input frames, target frame)."""
     data = stack_recordings(recordings, cell_m=spec.cell_m)
-    return select_windows(data, [Window(*each) for each in windows], sensors=sensors, translate=translate)
+    return select_windows(data, planned(*windows), sensors=sensors, translate=translate)
 
 
 def batch_of(windows: WindowSet, *, spec=SPEC, **disturb):

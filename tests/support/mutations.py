@@ -12,7 +12,7 @@ from support.small_runs import TINY, WINDOW
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.executors import InProcess
-from semgrid_eval.grids.recording import read_recordings
+from semgrid_eval.grids.recording import find_recordings
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import read_answer
 from semgrid_eval.models.checkpoint import read_header, read_history
@@ -25,6 +25,7 @@ from semgrid_eval.scores import results
 from semgrid_eval.scores.sums import check_sums
 from semgrid_eval.scores.thumbnails import read_pictures
 from semgrid_eval.seals import read_sealed
+from semgrid_eval.windows.storage import Storage
 
 ROWS = [
     {"name": "BL-DC", "model": "newest"},
@@ -40,7 +41,7 @@ KINDS: dict[str, tuple[str, Callable[[Path, str], object]]] = {
     "history": ("results/*/history.csv", lambda path, _: results.read_history(path.parent)),
     "windows": ("windows/*.npz", lambda path, _: results.read_windows(path.parent.parent, path.stem)),
     "thumbnails": ("pictures/*.npz", lambda path, _: read_pictures(path)),
-    "grids": ("grids/toy?-[0-9a-f]*.npz", lambda path, _: read_recordings(path, Path("log"), owner=_key(path))),
+    "grids": ("grids/toy?-[0-9a-f]*.npz", lambda path, _: find_recordings(path, Path("log"), owner=_key(path))),
     "truth": ("grids/*-truth-*.npz", lambda path, _: read_answer(path, _key(path))),
     "packed grids": ("packed/*/*.npz", lambda path, _: _packed(path.parents[1]).data(GridConfig(), path.parent.name)),
     "packed index": ("packed/packed.json", lambda path, _: _packed(path.parent)),
@@ -57,7 +58,7 @@ def _key(path: Path) -> str:
 
 
 def _packed(folder: Path) -> PackedGrids:
-    return PackedGrids(folder, load_matrix(str(folder.parent.parent / "m.yaml")).rows, torch.device("cpu"))
+    return PackedGrids(folder, load_matrix(str(folder.parent.parent / "m.yaml")).rows, Storage(torch.device("cpu")))
 
 
 def make_run(folder: Path) -> Path:

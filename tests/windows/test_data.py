@@ -7,12 +7,13 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from support.planned import listed, planned
 from support.recordings import FRAME_NS, random_recording, recording
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.windows.data import select_windows, window_arrays
 from semgrid_eval.windows.grids import GHOST_S, covered_without_truth, shift_grids, shift_in_cells, stack_recordings
-from semgrid_eval.windows.plan import Window, WindowConfig, training_windows, validation_windows
+from semgrid_eval.windows.plan import WindowConfig, training_windows, validation_windows
 
 SENSORS = ("full", "upper", "lower")
 
@@ -75,7 +76,7 @@ def test_pole_seen_by_a_moving_vehicle_stays_where_it_is():
     for frame, (forward_m, left_m) in enumerate(pole_m - position_m):
         grids[0, frame, int(15 - forward_m), int(8 - left_m)] = 5
     data = stack_recordings([recording(grids, position_m=position_m)], cell_m=1.0)
-    batch = select_windows(data, [Window(0, (0, 1), 2)], sensors=["full"]).batch(slice(0, 1))
+    batch = select_windows(data, planned((0, (0, 1), 2)), sensors=["full"]).batch(slice(0, 1))
     assert batch.shift_cells.tolist() == [[[5, 1], [3, 2]]]
     assert torch.equal(batch.past[0, 0, 0], batch.target[0])
     assert torch.equal(batch.past[0, 0, 1], batch.target[0])
@@ -98,11 +99,12 @@ def test_batch_holds_the_frames_of_its_windows(translate):
     chosen = torch.tensor([0, len(windows) - 1, 5, 5])
     batch = windows.batch(chosen)
     for row, number in enumerate(chosen.tolist()):
-        window, source = plan.windows[number], recordings[plan.windows[number].recording]
-        assert np.array_equal(batch.target[row], source.grids[0, window.target_frame])
+        owner, inputs, target = listed(plan.windows)[number]
+        source = recordings[owner]
+        assert np.array_equal(batch.target[row], source.grids[0, target])
         aligned = np.empty((1, 2, 2, 16, 16), np.uint8)
-        for t, frame in enumerate(window.input_frames):
-            shift = np.rint((source.position_m[window.target_frame] - source.position_m[frame]) / 0.5).astype(int)
+        for t, frame in enumerate(inputs):
+            shift = np.rint((source.position_m[target] - source.position_m[frame]) / 0.5).astype(int)
             assert batch.shift_cells[row, t].tolist() == shift.tolist()
             for s, name in enumerate(("lower", "upper")):
                 grid = source.grids[SENSORS.index(name), frame]
@@ -154,10 +156,10 @@ def test_actors_lie_at_the_target_and_where_they_were_before_it():
     plan = training_windows(data.frame_counts, WindowConfig(inputs=1, step_frames=2))
     windows = select_windows(data, plan.windows, sensors=["full"])
     flags = np.concatenate([windows.actors(slice(start, start + 7)) for start in range(0, len(windows), 7)])
-    for window, found in zip(plan.windows, flags, strict=True):
-        source = recordings[window.recording]
+    for (owner, _, target), found in zip(listed(plan.windows), flags, strict=True):
+        source = recordings[owner]
         nothing = np.zeros((16, 16), np.uint8)
-        expected = nothing if source.actors is None else slow_flags(source, window.target_frame)
+        expected = nothing if source.actors is None else slow_flags(source, target)
         np.testing.assert_array_equal(found, expected)
     assert np.array_equal(window_arrays(windows)["actors"], flags)
 
@@ -171,7 +173,7 @@ def test_actors_are_the_same_whatever_a_row_sees():
         plan = validation_windows(data.frame_counts, config)
         windows = select_windows(data, plan.windows, sensors=sensors, translate=translate)
         found.append(windows.actors(slice(None)))
-        reach_ns = data.stamps_ns[25] - data.stamps_ns[plan.windows[0].input_frames[0]]
+        reach_ns = data.stamps_ns[25] - data.stamps_ns[plan.windows.frames[0, 0]]
         assert reach_ns <= GHOST_S * 1e9, "the ghosts of all rows of the paper lie inside"
     assert found[0].any()
     for other in found[1:]:
@@ -180,7 +182,7 @@ def test_actors_are_the_same_whatever_a_row_sees():
 
 def test_without_the_truth_there_are_no_actors():
     data = stack_recordings([random_recording(0)], cell_m=0.5)
-    windows = select_windows(data, [Window(0, (0, 5), 10)], sensors=["full"])
+    windows = select_windows(data, planned((0, (0, 5), 10)), sensors=["full"])
     assert windows.actors(slice(0, 1)) is None
     assert "actors" not in window_arrays(windows)
 
@@ -195,7 +197,7 @@ def test_the_target_may_be_another_sensor():
     recordings = [replace(random_recording(0, sensors=SENSORS), target="upper")]
     data = stack_recordings(recordings, cell_m=0.5, sensors=["lower"])
     assert data.sensors == ("lower", "upper")
-    batch = select_windows(data, [Window(0, (0, 5), 10)], sensors=["lower"]).batch(slice(None))
+    batch = select_windows(data, planned((0, (0, 5), 10)), sensors=["lower"]).batch(slice(None))
     assert np.array_equal(batch.target[0], recordings[0].grids[1, 10])
 
 
@@ -217,9 +219,9 @@ def test_digest_tells_windows_apart():
 def test_faults_name_recording_and_sensor():
     data = stack_recordings([random_recording(0)], cell_m=0.5)
     with pytest.raises(InputError, match="no sensor 'rear', only full"):
-        select_windows(data, [Window(0, (0,), 5)], sensors=["rear"])
+        select_windows(data, planned((0, (0,), 5)), sensors=["rear"])
     with pytest.raises(InputError, match="no windows"):
-        select_windows(data, [], sensors=["full"])
+        select_windows(data, planned((0, (0, 5), 10))[:0], sensors=["full"])
     with pytest.raises(InputError, match="random 1 have no sensor 'upper', only full"):
         stack_recordings([random_recording(0, sensors=SENSORS), random_recording(1)], cell_m=0.5)
     with pytest.raises(InputError, match=r"random 1 are \(8, 8\), and the first ones are \(16, 16\)"):
