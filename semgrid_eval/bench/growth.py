@@ -105,7 +105,7 @@ class Stages:
         window = WindowConfig(step_frames=1, horizon_steps=point.lead)
         planned = training_windows(data.frame_counts, window).windows
         places = np.linspace(0, len(planned) - 1, SCORED_A_RECORDING * point.recordings).round().astype(int)
-        self._windows: WindowSet = select_windows(data, [planned[i] for i in places], sensors=names)
+        self._windows: WindowSet = select_windows(data, planned[places], sensors=names)
         self._given = Given(
             tuple(names), window.inputs, spec.rows, spec.columns, spec.cell_m, True, classes=self._grid.classes
         )
