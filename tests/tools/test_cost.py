@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from support.toy_world import street
 
 from semgrid_eval.log.store import write_log
@@ -20,6 +21,7 @@ def call(*arguments):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_each_stage_is_measured_over_each_quantity_and_drawn(tmp_path):
     for number in range(2):
         recording = street(number, frames=24).recording(f"toy_{number:06}_000000", "train")
