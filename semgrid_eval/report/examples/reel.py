@@ -24,6 +24,8 @@ MOST_MOMENTS = 10
 """At half a second each, nobody has to stop what plays by itself: it ends within five seconds."""
 _FEWEST_MOMENTS, _MOST_RIVALS, _BEST, _WORST = 3, 2, 2, 2
 Frames = Sequence[Frame | None]
+Show = Callable[[WindowRecord], Frames]
+"""Gives what is shown of an example, by moment."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class Column:
     """A column of the grid of examples."""
 
     title: str
-    show: Callable[[WindowRecord], Frames]  # what it shows of an example, by moment
+    show: Show
     rows: tuple[int, ...] = ()  # numbers of the rows whose answers it shows
 
 
@@ -150,7 +152,7 @@ def _over_time(contest: Contest, kept: _Kept) -> _Plan | None:
         start = min(max(0, others.index(window) - count // 2), len(others) - count)
         return others[start : start + count]
 
-    def over(give: Callable[[Row, WindowRecord], Frame | None], row: Row) -> Callable[[WindowRecord], Frames]:
+    def over(give: Callable[[Row, WindowRecord], Frame | None], row: Row) -> Show:
         return lambda window: [give(row, each) for each in around(window)]
 
     model, rivals = contest.model, contest.rivals[:_MOST_RIVALS]
@@ -170,9 +172,7 @@ def _over_leads(scores: Scores, kept: _Kept) -> _Plan | None:
     if not _FEWEST_MOMENTS <= len(line) == len(baselines):
         return None
 
-    def over(
-        give: Callable[[Row, WindowRecord], Frame | None], asked: Sequence[Row]
-    ) -> Callable[[WindowRecord], Frames]:
+    def over(give: Callable[[Row, WindowRecord], Frame | None], asked: Sequence[Row]) -> Show:
         return lambda window: [give(row, window) for row in asked]
 
     leads = [f"{row.shown.record.lead_s:.2f} s ahead" for row in line]
@@ -180,7 +180,8 @@ def _over_leads(scores: Scores, kept: _Kept) -> _Plan | None:
     targets = over(kept.target, [line[-1]] * len(line))
     columns = [Column("Newest input", over(kept.seen, line)), Column("Target", targets)]
     for asked in (line, baselines):
-        columns.append(Column(_span(asked), over(kept.answer, asked), tuple({row.number: None for row in asked})))
+        numbers = tuple(dict.fromkeys(row.number for row in asked))
+        columns.append(Column(_span(asked), over(kept.answer, asked), numbers))
     return _Plan("From farther and from nearer", hint, leads, columns, _picked(Contest(line[-1], (baselines[-1],))))
 
 
