@@ -1,4 +1,4 @@
-"""Rectify the images of cameras with OpenCV, once it is known where each pixel of the rectified image is in the raw one."""
+"""Rectify images with OpenCV, once it is known where each pixel of the rectified image is in the raw one."""
 
 from typing import Any
 

@@ -4,7 +4,8 @@ SRC/<split>/<log>/annotations.feather              boxes in the vehicle frame, w
 SRC/<split>/<log>/city_SE3_egovehicle.feather      poses, among them one for each time of boxes
 SRC/<split>/<log>/map/log_map_archive_*.json       drivable areas and crossings in the city frame
 SRC/<split>/<log>/sensors/lidar/<time>.feather     sweeps in the vehicle frame, where present
-SRC/<split>/<log>/sensors/cameras/stereo_front_*   images of the stereo pair, where present, and its calibration/*.feather
+SRC/<split>/<log>/sensors/cameras/stereo_front_*   undistorted images of the stereo pair, where present
+SRC/<split>/<log>/calibration/*.feather            of the pair, where there are images of it
 """
 
 from pathlib import Path

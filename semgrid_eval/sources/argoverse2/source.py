@@ -17,7 +17,8 @@ where its images and calibration are there, becomes a camera: rectified, dispari
 of ring cameras are left out, as nothing tells their depth.
 
 A log fails as a whole, in one line, if a file is missing or broken, a box is not finite, a category unknown, a pose
-missing, or an image of another size than its calibration. The others are converted; the exit code is then 1. Logs whose inputs have not changed are left as they are.
+missing, or an image of another size than its calibration. The others are converted; the exit code is then 1. Logs
+whose inputs have not changed are left as they are.
 """
 _EVERY = "Every how many pairs of stereo images, of which there are 20 a second, one is taken.  0: none."
 

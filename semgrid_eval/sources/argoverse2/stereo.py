@@ -9,6 +9,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError, located
 from semgrid_eval.files import read_bytes
@@ -32,6 +33,7 @@ _INTRINSICS = {
     **dict.fromkeys(_LENS, "float64"),
     **dict.fromkeys(("width_px", "height_px"), "int64"),
 }
+_NO_LENS = np.zeros(5)
 _ALL_SEEN = 0.0  # OpenCV's alpha: the rectified image shows only what the raw one shows
 
 
@@ -63,12 +65,11 @@ class StereoCamera:
             raise InputError(fault, path=self._intrinsics, field="width_px, height_px")
         self._size_px = left.size_px
         right_from_left = right.ego_from_optical.inverse() @ left.ego_from_optical
-        motion = right_from_left.rotation, right_from_left.translation_m
         with located(path=place):
-            turns, projections = _rectified(left, right, motion)
+            turns, projections = _rectified(left, right, right_from_left)
             self.calibration = _calibration(left, turns[0], projections)
         self._rectifications = [
-            Rectification(cv2.initUndistortRectifyMap(each.matrix, None, turn, p, left.size_px, cv2.CV_32FC1))
+            Rectification(cv2.initUndistortRectifyMap(each.matrix, _NO_LENS, turn, p, left.size_px, cv2.CV_32FC1))
             for each, turn, p in zip((left, right), turns, projections, strict=True)
         ]
         self._matching = SemiGlobalMatching(self.calibration)
@@ -86,7 +87,7 @@ class StereoCamera:
         matched = coded_disparity(self._matching.disparity_px(left, right))
         return CameraFrame(pair.stamp_ns, encode_gray(left), encode_gray(matched), None)
 
-    def _grey(self, path: Path) -> Floats:
+    def _grey(self, path: Path) -> NDArray[np.uint8]:
         data = read_bytes(path, limit=MAX_FILE_BYTES)
         size_px = read_size(data, path)
         if size_px != self._size_px:
@@ -117,12 +118,12 @@ def _row(table: Table, name: str, path: Path) -> int:
     return int(rows[0])
 
 
-def _rectified(left: _Camera, right: _Camera, motion: tuple[Floats, Floats]) -> tuple[list[Floats], list[Floats]]:
+def _rectified(left: _Camera, right: _Camera, right_from_left: SE3) -> tuple[list[Floats], list[Floats]]:
     """Return the turns (3, 3) of both cameras to common axes, and their projections P (3, 4) there."""
     flags = cv2.CALIB_ZERO_DISPARITY  # equal principal points: what is infinitely far has no disparity
-    found = cv2.stereoRectify(
-        left.matrix, None, right.matrix, None, left.size_px, *motion, flags=flags, alpha=_ALL_SEEN
-    )
+    lenses = left.matrix, _NO_LENS, right.matrix, _NO_LENS
+    turn, shift_m = right_from_left.rotation, right_from_left.translation_m
+    found = cv2.stereoRectify(*lenses, left.size_px, turn, shift_m, flags=flags, alpha=_ALL_SEEN)
     turns, projections = ([np.asarray(each, np.float64) for each in part] for part in (found[:2], found[2:4]))
     return turns, projections
 
@@ -131,10 +132,10 @@ def _calibration(left: _Camera, turn: Floats, projections: list[Floats]) -> Came
     """Return the calibration of the left camera after its turn (3, 3)."""
     rectified = SE3(left.ego_from_optical.rotation @ turn.T, left.ego_from_optical.translation_m)
     ego_from_camera = rectified @ CAMERA_FROM_OPTICAL.inverse()
-    p = projections[0]
-    lens = float(p[0, 0]), float(p[1, 1]), float(p[0, 2]), float(p[1, 2])
-    place_m = ego_from_camera.translation_m.tolist()
-    return CameraCalibration(*lens, baseline_m(*projections), *place_m, *roll_pitch_yaw_of(ego_from_camera.rotation))
+    fx_px, fy_px, u0_px, v0_px = (float(projections[0][place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    x_m, y_m, z_m = ego_from_camera.translation_m.tolist()
+    angles_rad = roll_pitch_yaw_of(ego_from_camera.rotation)
+    return CameraCalibration(fx_px, fy_px, u0_px, v0_px, baseline_m(*projections), x_m, y_m, z_m, *angles_rad)
 
 
 def _told(size_px: ImageSize) -> str:
