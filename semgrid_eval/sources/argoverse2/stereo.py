@@ -122,7 +122,7 @@ def _rectified(left: _Camera, right: _Camera, right_from_left: SE3) -> tuple[lis
     """Return the turns (3, 3) of both cameras to common axes, and their projections P (3, 4) there."""
     flags = cv2.CALIB_ZERO_DISPARITY  # equal principal points: what is infinitely far has no disparity
     lenses = left.matrix, _NO_LENS, right.matrix, _NO_LENS
-    turn, shift_m = right_from_left.rotation, right_from_left.translation_m
+    turn, shift_m = right_from_left.rotation, right_from_left.translation_m[:, np.newaxis]  # (3, 1)
     found = cv2.stereoRectify(*lenses, left.size_px, turn, shift_m, flags=flags, alpha=_ALL_SEEN)
     turns, projections = ([np.asarray(each, np.float64) for each in part] for part in (found[:2], found[2:4]))
     return turns, projections

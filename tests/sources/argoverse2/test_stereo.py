@@ -1,4 +1,4 @@
-"""The stereo pair of Argoverse: rectified and matched it tells how far a wall is; what cannot be used is told in a line."""
+"""The stereo pair of Argoverse: rectified and matched it tells how far a wall is; faults are told in a line."""
 
 import cv2
 import numpy as np
