@@ -1,6 +1,5 @@
 """The stereo pair of Argoverse: rectified and matched it tells how far a wall is; faults are told in a line."""
 
-import cv2
 import numpy as np
 import pytest
 
@@ -14,6 +13,7 @@ from support.argoverse_log import (
     STEREO_STEP_NS,
     stereo_tables,
     write_argoverse,
+    write_small_images,
     write_table,
 )
 
@@ -48,7 +48,10 @@ def frames(tmp_path, **options):
 
 
 def test_disparity_tells_how_far_the_wall_is(folder, tmp_path):
-    """Every matched pixel, taken to the vehicle by the calibration in the log, lies on the wall that was drawn."""
+    """Every matched pixel, taken to the vehicle by the calibration in the log, lies on the wall that was drawn.
+
+    Matching leans towards whole pixels, by up to .4 px, in which direction depends on the wall's distance.
+    """
     _, (first, *_) = frames(tmp_path)
     with LogReader(tmp_path / "logs" / "val" / "drive.mcap") as reader:
         calibration = reader.calibration(LEFT)
@@ -69,8 +72,7 @@ def test_disparity_tells_how_far_the_wall_is(folder, tmp_path):
     depth_m = (PLANE_M - ego_from_optical.translation_m[0]) / directions[:, 0]
     known_px = calibration.fx_px * calibration.baseline_m / depth_m
     error_px = np.abs(disparity_px[rows, columns] - known_px)
-    assert np.median(error_px) < 0.2
-    assert np.mean(error_px < 1.0) > 0.98
+    assert np.mean(error_px < 0.5) > 0.98
 
 
 def test_the_camera_is_where_the_left_one_is_above_the_ground(folder):
@@ -136,8 +138,7 @@ def late(folder):
 
 
 def smaller(folder):
-    path = folder / "sensors" / "cameras" / LEFT / f"{STAMPS_NS[0]}.jpg"
-    cv2.imwrite(str(path), np.zeros((100, 200), np.uint8))
+    write_small_images(folder / "sensors" / "cameras")
 
 
 def cut(folder):
