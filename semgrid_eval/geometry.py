@@ -121,6 +121,13 @@ def yaw_of(rotation: Floats) -> float:
     return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
 
 
+def roll_pitch_yaw_of(rotation: Floats) -> tuple[float, float, float]:
+    """Return the angles (rad) of a rotation (3, 3) = Rz(yaw) Ry(pitch) Rx(roll)."""
+    roll_rad = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
+    pitch_rad = float(-np.arcsin(np.clip(rotation[2, 0], -1.0, 1.0)))
+    return roll_rad, pitch_rad, yaw_of(rotation)
+
+
 def quaternion_of(rotation: Floats) -> Quaternion:
     """Return the quaternion of a rotation (3, 3), its largest part positive (Shepperd's method)."""
     (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()

@@ -1,11 +1,13 @@
 """Disparity of a rectified stereo pair, by OpenCV's semi-global matching along three paths."""
 
 import math
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.recording.colour import decode_colour
 from semgrid_eval.recording.types import CameraCalibration
 
 NEAREST_M = 3.0
@@ -37,3 +39,8 @@ class SemiGlobalMatching:
         """Match two grey images (H, W) and return the disparity (H, W); 0 where there is none."""
         found = self._matching.compute(left, right)
         return np.maximum(found, 0).astype(np.float32) / np.float32(_SUBPIXELS)
+
+
+def grey_of(data: bytes, path: Path) -> NDArray[np.uint8]:
+    """Decode an image, colour or grey, as a grey one (H, W); `path` is where it comes from."""
+    return np.asarray(cv2.cvtColor(decode_colour(data, path), cv2.COLOR_RGB2GRAY), np.uint8)

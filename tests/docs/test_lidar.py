@@ -13,6 +13,7 @@ from support.pages import blocks, commands, text_of
 
 from semgrid_eval.config import parse_config
 from semgrid_eval.grids.spec import GridConfig
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.scores.results import read_run
 from semgrid_eval.sensors.lidar import ColourFrom
 from semgrid_eval.sources.argoverse2.categories import CATEGORIES
@@ -57,11 +58,17 @@ def test_commands_for_kitti(workplace):
 
 def test_commands_for_argoverse(workplace):
     pytest.importorskip("pyarrow", reason="the extra `argoverse` is not installed")
+    pytest.importorskip("onnxruntime", reason="the extra `segment` is not installed")
+    pytest.importorskip("onnx", reason="onnx, which makes the models, is not installed")
     from support.argoverse_log import write_argoverse
+    from support.onnx_models import colour_network
 
-    write_argoverse(workplace / "SRC", frames=14)
+    write_argoverse(workplace / "SRC", frames=14, stereo=True)
+    colour_network(Path("network.onnx"), colours={0: (0.5, 0.5, 0.5), 11: (1.0, 0.0, 0.0)})
     Path("tracks.yaml").write_text(MATRICES[1].replace("[1, 2, 3]", "[3]"))
     run(TRACKS)
+    with LogReader(Path("labelled/val/drive.mcap")) as labelled:
+        assert all(frame.label_png for frame in labelled.frames("stereo_front_left"))
     exec(blocks("python", PAGE)[0], {})
     assert [path.name for path in Path("wrong/val").iterdir()] == ["drive.mcap"]
     rows = read_run(Path("runs/tracks")).rows

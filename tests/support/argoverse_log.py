@@ -5,9 +5,13 @@ import math
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 from pyarrow import feather
+
+from semgrid_eval.geometry import rotation_of
 
 FRAMES, STEP_NS, START_NS = 6, 100_000_000, 315_966_253_000_000_000
 CITY_M, YAW_RAD = (5000.0, 2400.0), 0.4
@@ -76,6 +80,73 @@ def city_map() -> dict[str, Any]:
     }
 
 
+STEREO = {
+    "stereo_front_left": (
+        (1689.592559, 1024.542828, 763.972562, -0.284888, -0.027553, 0.094135),
+        (0.500842, -0.499026, 0.500668, -0.499461, 1.625064, 0.250715, 1.190953),
+    ),
+    "stereo_front_right": (
+        (1690.515378, 1023.948054, 767.021130, -0.282783, -0.036770, 0.104836),
+        (0.503349, -0.499190, 0.498505, -0.498941, 1.630594, -0.247706, 1.190142),
+    ),
+}
+"""Focal length, principal point and lens, then turn and place, of the pair of a real log."""
+STEREO_SIZE, STEREO_SCALE = (512, 388), 0.25
+PLANE_M = 12.0
+"""How far ahead of the rear axle the upright plane stands that the pair sees."""
+STEREO_STEP_NS, STEREO_OFFSET_NS, APART_NS = 50_000_000, 20_000_000, 1_000_000
+
+
+def stereo_tables() -> tuple[dict[str, list[Any]], dict[str, list[Any]]]:
+    """Intrinsics of the pair, its images a quarter as large as the real ones, and extrinsics."""
+    intrinsics: dict[str, list[Any]] = {"sensor_name": list(STEREO)}
+    numbers = np.array([lens for lens, _ in STEREO.values()])
+    scaled = numbers[:, [0, 0, 1, 2]] * STEREO_SCALE
+    for name, column in zip(("fx_px", "fy_px", "cx_px", "cy_px"), scaled.T, strict=True):
+        intrinsics[name] = column.tolist()
+    for name, column in zip(("k1", "k2", "k3"), numbers[:, 3:].T, strict=True):
+        intrinsics[name] = column.tolist()
+    intrinsics["height_px"], intrinsics["width_px"] = [STEREO_SIZE[1]] * 2, [STEREO_SIZE[0]] * 2
+    places: dict[str, list[Any]] = {"sensor_name": list(STEREO)}
+    for number, name in enumerate(("qw", "qx", "qy", "qz", "tx_m", "ty_m", "tz_m")):
+        places[name] = [place[number] for _, place in STEREO.values()]
+    return intrinsics, places
+
+
+def stereo_image(name: str) -> NDArray[np.uint8]:
+    """What a camera of the pair sees of a wall with spots, upright and across the way, without distortion."""
+    (focal_px, u0_px, v0_px, *_), (w, x, y, z, *place_m) = STEREO[name]
+    rows, columns = np.mgrid[: STEREO_SIZE[1], : STEREO_SIZE[0]]
+    f_px, u_px, v_px = (each * STEREO_SCALE for each in (focal_px, u0_px, v0_px))
+    rays = np.stack([(columns - u_px) / f_px, (rows - v_px) / f_px, np.ones(rows.shape)], axis=-1)
+    rays = rays @ rotation_of((x, y, z, w)).T
+    across = rays * ((PLANE_M - place_m[0]) / rays[..., :1]) + np.array(place_m)
+    spots = np.random.default_rng(1).integers(0, 256, (400, 400), np.uint8)
+    spots = cv2.GaussianBlur(spots, (0, 0), 1.2)
+    spots = cv2.normalize(spots, None, 0, 255, cv2.NORM_MINMAX)
+    at = [(across[..., axis] * 20 + 200).astype(np.float32) for axis in (1, 2)]
+    return np.asarray(cv2.remap(spots, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP), np.uint8)
+
+
+def write_stereo(folder: Path) -> None:
+    """Write calibration and images of the pair, by their own clock and the right ones a little late."""
+    for name, content in zip(("intrinsics", "egovehicle_SE3_sensor"), stereo_tables(), strict=True):
+        write_table(folder / "calibration" / f"{name}.feather", content)
+    for name, late_ns in zip(STEREO, (0, APART_NS), strict=True):
+        image = stereo_image(name)
+        images = folder / "sensors" / "cameras" / name
+        images.mkdir(parents=True)
+        for number in range(4):
+            stamp_ns = START_NS + STEREO_OFFSET_NS + number * STEREO_STEP_NS + late_ns
+            cv2.imwrite(str(images / f"{stamp_ns}.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 95])
+
+
+def write_small_images(images: Path) -> None:
+    """Make the images of the left camera smaller than its calibration says."""
+    for path in sorted((images / "stereo_front_left").iterdir()):
+        cv2.imwrite(str(path), np.zeros((100, 200), np.uint8))
+
+
 def write_table(path: Path, content: dict[str, list[Any]]) -> None:
     """Write a feather file."""
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -83,7 +154,13 @@ def write_table(path: Path, content: dict[str, list[Any]]) -> None:
 
 
 def write_argoverse(
-    root: Path, name: str = "drive", split: str = "val", *, frames: int = FRAMES, sweeps: bool = False
+    root: Path,
+    name: str = "drive",
+    split: str = "val",
+    *,
+    frames: int = FRAMES,
+    sweeps: bool = False,
+    stereo: bool = False,
 ) -> Path:
     """Write a log, and return its folder."""
     folder = root / split / name
@@ -91,6 +168,8 @@ def write_argoverse(
     write_table(folder / "city_SE3_egovehicle.feather", pose_columns(frames))
     (folder / "map").mkdir()
     (folder / "map" / f"log_map_archive_{name}____PIT_city_1.json").write_text(json.dumps(city_map()))
+    if stereo:
+        write_stereo(folder)
     if sweeps:
         points = {"x": [1.5, -2.0], "y": [0.25, 3.0], "z": [0.0, 1.0]}
         halves: dict[str, Any] = {axis: pa.array(np.array(each, np.float16)) for axis, each in points.items()}

@@ -4,14 +4,18 @@ SRC/<split>/<log>/annotations.feather              boxes in the vehicle frame, w
 SRC/<split>/<log>/city_SE3_egovehicle.feather      poses, among them one for each time of boxes
 SRC/<split>/<log>/map/log_map_archive_*.json       drivable areas and crossings in the city frame
 SRC/<split>/<log>/sensors/lidar/<time>.feather     sweeps in the vehicle frame, where present
+SRC/<split>/<log>/sensors/cameras/stereo_front_*   undistorted images of the stereo pair, where present
+SRC/<split>/<log>/calibration/*.feather            of the pair, where there are images of it
 """
 
 from pathlib import Path
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs
+from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs, how_to_label
 from semgrid_eval.sources.argoverse2.drive import Drive
+from semgrid_eval.sources.argoverse2.pairs import cameras_folder
 from semgrid_eval.sources.argoverse2.source import ArgoverseOptions
+from semgrid_eval.sources.argoverse2.stereo import CAMERA
 
 SPLITS = ("train", "val", "test")
 
@@ -22,8 +26,11 @@ def convert_argoverse(options: ArgoverseOptions, out: Path, work: Work = IN_PROC
     Raises:
         InputError: there is no such split, no log in it, or the disk is full.
     """
-    jobs = [ConversionJob(each.name, each.split, each.digest, each.recording) for each in _drives(options)]
-    return convert_jobs(jobs, out, work)
+    drives = _drives(options)
+    jobs = [ConversionJob(each.name, each.split, each.digest, each.recording) for each in drives]
+    summary = convert_jobs(jobs, out, work)
+    summary.remark = _remark([each for each in drives if f"{each.split}/{each.name}" not in summary.failed], out)
+    return summary
 
 
 def _drives(options: ArgoverseOptions) -> list[Drive]:
@@ -33,7 +40,7 @@ def _drives(options: ArgoverseOptions) -> list[Drive]:
             raise InputError(f"{split} is not one of: {', '.join(there) or 'none'}", path=options.src, field="split")
     chosen = [split for split in there if split in options.split or not options.split]
     found = [
-        Drive(folder, split)
+        Drive(folder, split, options.stereo_every)
         for split in chosen
         for folder in sorted((options.src / split).iterdir())
         if folder.is_dir() and not folder.name.startswith(".")
@@ -41,3 +48,13 @@ def _drives(options: ArgoverseOptions) -> list[Drive]:
     if not found:
         raise InputError(f"holds no log in a folder {', '.join(chosen or SPLITS)}", path=options.src)
     return found
+
+
+def _remark(drives: list[Drive], out: Path) -> str:
+    """Say in one line what is not there."""
+    parts = []
+    if seen := sum(bool(drive.pairs) for drive in drives):
+        parts.append(f"no labels for {CAMERA} of {seen} logs: {how_to_label(out)}")
+    if rings := sum(any(cameras_folder(drive.folder).glob("ring_*")) for drive in drives):
+        parts.append(f"images of ring cameras left out, as nothing tells their depth, in {rings} logs")
+    return "; ".join(parts)

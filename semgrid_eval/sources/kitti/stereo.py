@@ -2,18 +2,15 @@
 
 from pathlib import Path
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError, located
 from semgrid_eval.geometry import SE3
-from semgrid_eval.recording.colour import decode_colour
 from semgrid_eval.recording.disparity import coded_disparity
 from semgrid_eval.recording.png import encode_gray
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame
 from semgrid_eval.sources.kitti.files import Calibration, read_file
-from semgrid_eval.sources.matching import SemiGlobalMatching
+from semgrid_eval.sources.matching import SemiGlobalMatching, grey_of
 
 
 def calibration_of(given: Calibration, ego_from_camera0: SE3, path: Path) -> CameraCalibration:
@@ -48,13 +45,9 @@ class StereoPairs:
             InputError: an image is missing or damaged, or their sizes differ.
         """
         files = [read_file(path) for path in (left, right)]
-        grey = [_grey(data, path) for data, path in zip(files, (left, right), strict=True)]
+        grey = [grey_of(data, path) for data, path in zip(files, (left, right), strict=True)]
         if grey[0].shape != grey[1].shape:
             sizes = [f"{each.shape[1]} x {each.shape[0]}" for each in grey]
             raise InputError(f"is {sizes[1]}, but the left image is {sizes[0]}", path=right)
         matched = self._matching.disparity_px(*grey)
         return CameraFrame(stamp_ns, files[0], encode_gray(coded_disparity(matched)), None)
-
-
-def _grey(data: bytes, path: Path) -> NDArray[np.uint8]:
-    return np.asarray(cv2.cvtColor(decode_colour(data, path), cv2.COLOR_RGB2GRAY), np.uint8)

@@ -1,4 +1,4 @@
-"""Calibrations of cameras: what CameraInfo says, how raw images are rectified, and baselines."""
+"""Calibrations of cameras: what CameraInfo says, and how raw images are rectified."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.recording.types import CameraCalibration
+from semgrid_eval.sources.rectification import Maps, Rectification
 from semgrid_eval.sources.ros2.mapping import Extrinsics
 
 _LENSES = ("", "plumb_bob", "rational_polynomial")
 _FISHEYE = ("equidistant", "fisheye")
-_INTERPOLATION = {"bilinear": cv2.INTER_LINEAR, "nearest": cv2.INTER_NEAREST}
-Picture = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -50,18 +49,6 @@ class Info:
         return np.hstack([np.array(self.k).reshape(3, 3), np.zeros((3, 1))])
 
 
-def baseline_m(left: NDArray[np.float64], right: NDArray[np.float64]) -> float:
-    """Return how far the right camera of a rectified pair is to the right, from both P (3, 4).
-
-    Raises:
-        InputError: it is not to the right.
-    """
-    found = float(left[0, 3] - right[0, 3]) / float(left[0, 0])
-    if not found > 0:
-        raise InputError(f"P says that the right camera is {found:g} m to the right of the left one")
-    return found
-
-
 def calibration_of(projection: NDArray[np.float64], baseline: float, place: Extrinsics) -> CameraCalibration:
     """Put the parts of a calibration together."""
     return CameraCalibration(
@@ -74,30 +61,16 @@ def calibration_of(projection: NDArray[np.float64], baseline: float, place: Extr
     )
 
 
-class Rectification:
-    """Undoes the distortion of a camera's raw images; leaves pictures alone that have none."""
+def rectification_of(info: Info, *, rectified: bool) -> Rectification:
+    """Return what undoes the distortion of a camera's raw images, and leaves those alone that have none.
 
-    def __init__(self, info: Info, *, rectified: bool) -> None:
-        """Prepare.
-
-        Raises:
-            InputError: the lens is not one of those that OpenCV knows.
-        """
-        self._maps = None if rectified else _maps(info)
-
-    @property
-    def changes(self) -> bool:
-        """Whether pictures are changed."""
-        return self._maps is not None
-
-    def apply(self, picture: Picture, how: str) -> Picture:
-        """Rectify a picture (H, W, ...), `bilinear` or `nearest`; what no pixel shows becomes 0."""
-        if self._maps is None:
-            return picture
-        return np.asarray(cv2.remap(picture, *self._maps, _INTERPOLATION[how]), picture.dtype)
+    Raises:
+        InputError: the lens is not one of those that OpenCV knows.
+    """
+    return Rectification(None if rectified else _maps(info))
 
 
-def _maps(info: Info) -> tuple[Picture, Picture] | None:
+def _maps(info: Info) -> Maps | None:
     """Return where each pixel of the rectified image is in the raw one, None where that is the same place."""
     projection = info.projection(rectified=False)[:, :3]
     camera, lens = np.array(info.k).reshape(3, 3), np.array(info.d)

@@ -12,8 +12,9 @@ from semgrid_eval.recording.disparity import LARGEST_PX, coded_disparity
 from semgrid_eval.recording.png import encode, encode_gray
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame
 from semgrid_eval.sources.matching import SemiGlobalMatching
+from semgrid_eval.sources.rectification import baseline_m
 from semgrid_eval.sources.ros2 import pictures
-from semgrid_eval.sources.ros2.cameras import Info, Rectification, baseline_m, calibration_of
+from semgrid_eval.sources.ros2.cameras import Info, calibration_of, rectification_of
 from semgrid_eval.sources.ros2.labels import LabelTable
 from semgrid_eval.sources.ros2.mapping import CameraMap, Extrinsics, VehicleMap
 from semgrid_eval.sources.ros2.scan import Facts
@@ -66,10 +67,10 @@ class Rig:
 
     def __init__(self, plan: RigPlan) -> None:
         self._camera, self._calibration = plan.camera, plan.calibration
-        self._left = Rectification(plan.info, rectified=plan.camera.rectified)
+        self._left = rectification_of(plan.info, rectified=plan.camera.rectified)
         self._labels = LabelTable(plan.camera.ids)
         if plan.right_info is not None and plan.camera.right is not None:
-            self._right = Rectification(plan.right_info, rectified=plan.camera.rectified)
+            self._right = rectification_of(plan.right_info, rectified=plan.camera.rectified)
             self._matching = SemiGlobalMatching(plan.calibration)
             left, right = (each.projection(rectified=plan.camera.rectified) for each in (plan.info, plan.right_info))
             self._shift_px = float(left[0, 2] - right[0, 2])  # what is infinitely far has this disparity

@@ -82,15 +82,9 @@ class Transforms:
 def extrinsics_of(vehicle_from_optical: SE3) -> Extrinsics:
     """Return place and angles of a camera whose optical frame is there: R = Rz(yaw) Ry(pitch) Rx(roll)."""
     vehicle_from_camera = vehicle_from_optical @ CAMERA_FROM_OPTICAL.inverse()
-    turn, (x_m, y_m, z_m) = vehicle_from_camera.rotation, vehicle_from_camera.translation_m
-    return Extrinsics(
-        x_m=float(x_m),
-        y_m=float(y_m),
-        z_m=float(z_m),
-        roll_rad=float(np.arctan2(turn[2, 1], turn[2, 2])),
-        pitch_rad=float(-np.arcsin(np.clip(turn[2, 0], -1.0, 1.0))),
-        yaw_rad=geometry.yaw_of(turn),
-    )
+    roll_rad, pitch_rad, yaw_rad = geometry.roll_pitch_yaw_of(vehicle_from_camera.rotation)
+    x_m, y_m, z_m = vehicle_from_camera.translation_m.tolist()
+    return Extrinsics(x_m=x_m, y_m=y_m, z_m=z_m, roll_rad=roll_rad, pitch_rad=pitch_rad, yaw_rad=yaw_rad)
 
 
 def rotation_of(quaternion: Any) -> np.ndarray[Any, np.dtype[np.float64]]:  # noqa: ANN401

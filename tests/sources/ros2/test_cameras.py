@@ -4,7 +4,8 @@ import pytest
 from support.ros_messages import camera_info
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.sources.ros2.cameras import Info, Rectification, baseline_m
+from semgrid_eval.sources.rectification import baseline_m
+from semgrid_eval.sources.ros2.cameras import Info, rectification_of
 
 SIZE = (200, 120)
 K = np.array([[150.0, 0.0, 97.0], [0.0, 152.0, 61.0], [0.0, 0.0, 1.0]])
@@ -22,7 +23,7 @@ def test_distortion_is_undone():
     raw = np.zeros(SIZE[::-1], np.uint8)
     for u, v in bent[:, 0]:
         cv2.circle(raw, (round(u * 16), round(v * 16)), 40, 255, -1, cv2.LINE_AA, 4)
-    rectification = Rectification(info(d=LENS), rectified=False)
+    rectification = rectification_of(info(d=LENS), rectified=False)
     assert rectification.changes
     straight = rectification.apply(raw, "bilinear")
     expected = (rays @ K.T)[:, :2]
@@ -39,18 +40,18 @@ def test_distortion_is_undone():
 def test_labels_are_moved_not_mixed():
     raw = np.full(SIZE[::-1], 7, np.uint8)
     raw[:, 100:] = 26
-    assert set(np.unique(Rectification(info(d=LENS), rectified=False).apply(raw, "nearest"))) <= {0, 7, 26}
+    assert set(np.unique(rectification_of(info(d=LENS), rectified=False).apply(raw, "nearest"))) <= {0, 7, 26}
 
 
 @pytest.mark.parametrize(("rectified", "lens"), [(True, LENS), (False, ())])
 def test_pictures_without_distortion_stay_untouched(rectified, lens):
-    assert not Rectification(info(d=lens), rectified=rectified).changes
+    assert not rectification_of(info(d=lens), rectified=rectified).changes
 
 
 def test_a_fisheye_is_undone_by_its_own_model():
     told = camera_info(1, SIZE, K, d=(0.1, -0.02, 0.0, 0.0))
     told.distortion_model = "equidistant"
-    rectification = Rectification(Info.of(told), rectified=False)
+    rectification = rectification_of(Info.of(told), rectified=False)
     rays = np.array([[[0.3, -0.2]]])
     bent = cv2.fisheye.distortPoints(rays, K, np.array([0.1, -0.02, 0.0, 0.0]))[0, 0]
     columns = np.tile(np.arange(SIZE[0], dtype=np.float32), (SIZE[1], 1))
@@ -62,7 +63,7 @@ def test_lenses_that_are_not_known_are_refused():
     told = camera_info(1, SIZE, K, d=LENS)
     told.distortion_model = "omni"
     with pytest.raises(InputError, match="its lens is 'omni'; known are plumb_bob, rational_polynomial, equidistant"):
-        Rectification(Info.of(told), rectified=False)
+        rectification_of(Info.of(told), rectified=False)
 
 
 def test_a_calibration_without_p_is_its_k_if_there_is_no_distortion():

@@ -22,7 +22,7 @@ from semgrid_eval.recording.disparity import decoded_disparity
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.relabel import segment_logs
-from semgrid_eval.sources.ros2.cameras import Info, Rectification
+from semgrid_eval.sources.ros2.cameras import Info, rectification_of
 from semgrid_eval.sources.ros2.convert import convert_bags
 from semgrid_eval.sources.ros2.options import Ros2Options
 
@@ -104,7 +104,7 @@ def test_raw_images_are_rectified_and_stored_without_loss(tmp_path):
     ]
     text = bag.variant.map_text.replace("rectified: true", "rectified: false")
     _, (log,) = converted(tmp_path, messages=messages, text=text)
-    rectification = Rectification(Info.of(camera_info(1, (WIDTH, HEIGHT), k, d=lens)), rectified=False)
+    rectification = rectification_of(Info.of(camera_info(1, (WIDTH, HEIGHT), k, d=lens)), rectified=False)
     photos = [decode_colour(bytes(each.message.data)) for each in messages if each.topic == IMAGE]
     for frame, photo, expected in zip(frames_of(log), photos, originals(), strict=True):
         assert kind_of(frame.image_file) == "png"

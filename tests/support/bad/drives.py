@@ -3,10 +3,18 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 
 import numpy as np
-from support.argoverse_log import columns, pose_columns, write_argoverse, write_table
+from support.argoverse_log import (
+    columns,
+    pose_columns,
+    stereo_tables,
+    write_argoverse,
+    write_small_images,
+    write_table,
+)
 from support.bad.case import Bad, Kind
 from support.kitti_tree import Sequence
 from support.swept import recorded, sweep
@@ -19,11 +27,13 @@ ARGOVERSE = "convert argoverse2 AV new --workers 1"
 FOLDER = Path("KITTI/sequences/03")
 BOXES, POSES = (Path("AV/val/drive", name) for name in ("annotations.feather", "city_SE3_egovehicle.feather"))
 
+IMAGES, INTRINSICS = Path("AV/val/drive/sensors/cameras"), Path("AV/val/drive/calibration/intrinsics.feather")
+
 
 def whole() -> None:
     """Write a sequence of each data set, and logs of which one has bare sweeps, one images without labels, too."""
     Sequence().write(Path("KITTI"))
-    write_argoverse(Path("AV"))
+    write_argoverse(Path("AV"), stereo=True)
     write_log(street(1, frames=4).recording(), Path("camera/a.mcap"))
     for folder, calibrations in (("bare", {}), ("unlabelled", {"front": street(1).calibration()})):
         recording = recorded(lambda seen=bool(calibrations): _moments(seen=seen))
@@ -65,6 +75,10 @@ def _cell(column: str, value: object) -> Callable[[dict[str, list[Any]]], object
     return lambda table: table[column].__setitem__(5, value)
 
 
+def _others(table: dict[str, list[Any]]) -> None:
+    table["sensor_name"] = [name.replace("stereo", "ring") for name in table["sensor_name"]]
+
+
 def _grid(words: str, logs: str, sensor: str) -> Bad:
     text = f"sensors: {{a: {sensor}}}\ntarget: [a]\n"
     return Bad(words, f"grids {logs} grids --config grid.yaml --workers 1", {"grid.yaml": text.encode()})
@@ -72,7 +86,7 @@ def _grid(words: str, logs: str, sensor: str) -> Bad:
 
 DRIVES = Kind(
     "Drives of SemanticKITTI and Argoverse",
-    "A sequence of four scans with labels, and a drive of six times with boxes.",
+    "A sequence of four scans with labels, and a drive of six times with boxes and images of the stereo pair.",
     whole,
     (
         _file("labels of another count than points", "labels/000001.label", _ids(40)),
@@ -85,6 +99,10 @@ DRIVES = Kind(
         _table("a box that is not a number", BOXES, columns, _cell("tx_m", float("nan"))),
         _table("a box of an unknown category", BOXES, columns, _cell("category", "TANK")),
         _table("boxes without poses", POSES, lambda: pose_columns(3), lambda table: None),
+        Bad("one camera of the stereo pair", ARGOVERSE, spoil=lambda: rmtree(IMAGES / "stereo_front_right")),
+        Bad("images of another size than the calibration", ARGOVERSE, spoil=lambda: write_small_images(IMAGES)),
+        Bad("images without calibration", ARGOVERSE, spoil=INTRINSICS.unlink),
+        _table("images of a camera that is not calibrated", INTRINSICS, lambda: stereo_tables()[0], _others),
     ),
 )
 GRIDS = Kind(

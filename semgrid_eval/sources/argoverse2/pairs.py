@@ -1,0 +1,63 @@
+"""Which images of the stereo cameras belong together."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_eval.errors import InputError
+
+LEFT, RIGHT = "stereo_front_left", "stereo_front_right"
+TOGETHER_NS = 5_000_000
+"""Both images of a pair are taken within this time: a tenth of the time between pairs."""
+_STAMP = re.compile(r"[0-9]{1,19}")
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Both images of one time, that of the left one."""
+
+    stamp_ns: int
+    left: Path
+    right: Path
+
+
+def stamped(folder: Path, pattern: str) -> dict[int, Path]:
+    """Return the files of a folder whose names are times, by time."""
+    return {int(path.stem): path for path in sorted(folder.glob(pattern)) if _STAMP.fullmatch(path.stem)}
+
+
+def cameras_folder(log: Path) -> Path:
+    """Return the folder of a log that holds the folders of its cameras."""
+    return log / "sensors" / "cameras"
+
+
+def pairs_of(log: Path) -> tuple[Pair, ...]:
+    """Find the pairs of a log, in the order of time; images of one camera alone are left out.
+
+    Raises:
+        InputError: there are images, but no pair.
+    """
+    left, right = (stamped(cameras_folder(log) / name, "*.jpg") for name in (LEFT, RIGHT))
+    if not (left or right):
+        return ()
+    for name, found, other, there in ((LEFT, left, RIGHT, right), (RIGHT, right, LEFT, left)):
+        if not found:
+            raise InputError(f"holds no image, but {other} holds {len(there)}", path=cameras_folder(log) / name)
+    rights_ns = np.array(list(right), np.int64)
+    nearest = {stamp_ns: _nearest(stamp_ns, rights_ns) for stamp_ns in left}
+    pairs = tuple(
+        Pair(stamp_ns, left[stamp_ns], right[other_ns])
+        for stamp_ns, other_ns in sorted(nearest.items())
+        if abs(other_ns - stamp_ns) <= TOGETHER_NS
+    )
+    if not pairs:
+        fault = f"holds no image within {TOGETHER_NS * 1e-6:g} ms of one of {LEFT}"
+        raise InputError(fault, path=cameras_folder(log) / RIGHT)
+    return pairs
+
+
+def _nearest(stamp_ns: int, others_ns: NDArray[np.int64]) -> int:
+    return int(others_ns[np.abs(others_ns - stamp_ns).argmin()])
