@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from semgrid_eval.sources.kitti.labels import CLASSES, classes_of
-from semgrid_eval.sources.ros2.clouds import NUMBERS, WHOLE, columns_of, type_of
+from semgrid_eval.sources.ros2.clouds import NUMBERS, WHOLE, Extras, columns_of, type_of
 from semgrid_eval.sources.ros2.labels import likely_ids
 from semgrid_eval.sources.ros2.lidars import LONGEST_NS, NS_BY_UNIT
-from semgrid_eval.sources.ros2.mapping import LidarMap, PointTimes
+from semgrid_eval.sources.ros2.mapping import PointTimes
 
 _TIME_NAMES = ("t", "time", "timestamp", "time_stamp", "time_offset", "offset_time")
 _LABEL_NAMES = ("label", "labels", "label_id", "class", "class_id", "semantic", "objtag")
@@ -45,8 +45,7 @@ def look_at_cloud(message: Any) -> CloudSeen:  # noqa: ANN401 - a class that ros
     """
     fields = {field.name: type_of(field) for field in message.fields}
     time, label = _named(_TIME_NAMES, fields, NUMBERS), _named(_LABEL_NAMES, fields, WHOLE)
-    times = None if time is None else PointTimes(field=time, unit="s")
-    points = columns_of(message, LidarMap(cloud="/cloud", times=times, label_field=label))
+    points = columns_of(message, Extras(label, time))
     return CloudSeen(
         fields=tuple(fields.items()),
         width=message.width,

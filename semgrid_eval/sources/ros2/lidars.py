@@ -12,7 +12,7 @@ from semgrid_eval.motion import EgoMotion
 from semgrid_eval.recording.lidar import LidarSweep, Mount
 from semgrid_eval.sources.deskewing import deskewed
 from semgrid_eval.sources.kitti.labels import classes_of
-from semgrid_eval.sources.ros2.clouds import INTENSITY, PLACE, columns_of
+from semgrid_eval.sources.ros2.clouds import INTENSITY, PLACE, Extras, columns_of, is_empty
 from semgrid_eval.sources.ros2.labels import LabelTable
 from semgrid_eval.sources.ros2.mapping import HIGHEST_POINT, LidarMap, PointTimes, VehicleMap
 from semgrid_eval.sources.ros2.scan import Facts
@@ -64,7 +64,9 @@ class Sweeps:
         Raises:
             InputError: the cloud is not what the map says, or a label, time or place is impossible.
         """
-        points = columns_of(message, self._lidar)
+        if is_empty(message):
+            return self._empty(stamp_ns)
+        points = columns_of(message, Extras.of(self._lidar))
         place_m = np.stack([points[axis] for axis in PLACE], axis=1).astype(np.float64)
         returned = np.isfinite(place_m).all(axis=1) & place_m.any(axis=1)
         points = points[returned]
@@ -72,6 +74,10 @@ class Sweeps:
             moved_m = self._at_stamp(place_m[returned], points, stamp_ns).astype(np.float32)
             intensity = _intensity(points)
         return LidarSweep(stamp_ns, self._mount, moved_m, intensity, self._label_id(points))
+
+    def _empty(self, stamp_ns: int) -> LidarSweep:
+        label_id = None if self._lidar.label_field is None else np.zeros(0, np.uint8)
+        return LidarSweep(stamp_ns, self._mount, np.zeros((0, 3), np.float32), np.zeros(0, np.float32), label_id)
 
     def _at_stamp(self, place_m: NDArray[np.float64], points: Columns, stamp_ns: int) -> NDArray[np.float64]:
         if self._lidar.times is None:

@@ -10,7 +10,7 @@ from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.arrivals import Arrivals, Ledger
 from semgrid_eval.sources.ros2.bag import Arrival, Bag
 from semgrid_eval.sources.ros2.cameras import Info
-from semgrid_eval.sources.ros2.clouds import require_layout
+from semgrid_eval.sources.ros2.clouds import Extras, is_empty, require_layout
 from semgrid_eval.sources.ros2.mapping import BagMap
 from semgrid_eval.sources.ros2.motion import Track, values_of
 from semgrid_eval.sources.ros2.pictures import Shape, require_coding, shape_of
@@ -150,8 +150,8 @@ class _Scanner:
     def _cloud(self, topic: str, stamp_ns: int, message: Any) -> None:  # noqa: ANN401
         with located(field=f"{topic} at {stamp_ns} ns"):
             for lidar in self._mapping.lidars.values():
-                if lidar.cloud == topic:
-                    require_layout(message, lidar)
+                if lidar.cloud == topic and not is_empty(message):
+                    require_layout(message, Extras.of(lidar))
 
 
 def stamp_of(message: Any) -> int:  # noqa: ANN401

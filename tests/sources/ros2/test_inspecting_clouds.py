@@ -7,7 +7,7 @@ import pytest
 import yaml
 from support.bags import LATE_NS, RecordingBag, Sent, write_bag
 from support.rig_bags import Coding, RigBag
-from support.ros_messages import OPTICAL, cloud
+from support.ros_messages import OPTICAL, cloud, no_cloud
 from support.swept import START_NS, Drive, recorded, scanned
 from support.toy_world import street
 
@@ -123,7 +123,11 @@ def test_several_lidars_are_named_by_their_topics(tmp_path):
 def test_a_cloud_that_cannot_be_read_is_told_and_not_drafted(tmp_path):
     messages = list(RecordingBag(street(1, frames=3).recording()).messages())
     points = np.zeros(2, [("range", "f4")])
-    sent = Sent("/ranges", messages[-1].received_ns, cloud(START_NS + LATE_NS, points))
-    said, text = inspected(tmp_path, [*messages, sent])
+    sent = [
+        Sent("/ranges", messages[-1].received_ns, cloud(START_NS + LATE_NS, points)),
+        Sent("/nothing", messages[-1].received_ns, no_cloud(START_NS + LATE_NS)),
+    ]
+    said, text = inspected(tmp_path, [*messages, *sent])
     assert "has no field x; there are: range" in said
+    assert "has no field x; there are: none" in said
     assert "lidars:" not in text
