@@ -34,7 +34,7 @@ class Extras(NamedTuple):
     @classmethod
     def of(cls, lidar: LidarMap) -> "Extras":
         """Return those that a map names."""
-        return cls(lidar.label_field, lidar.times and lidar.times.field)
+        return cls(lidar.label_field, None if lidar.times is None else lidar.times.field)
 
 
 def is_empty(message: Any) -> bool:  # noqa: ANN401
@@ -80,6 +80,20 @@ def columns_of(message: Any, extras: Extras) -> NDArray[np.void]:  # noqa: ANN40
     used = np.ascontiguousarray(rows[:, : message.width * message.point_step])
     points: NDArray[np.void] = used.reshape(-1, message.point_step).view(np.dtype(layout))[:, 0]
     return points
+
+
+def returned(points: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Return which points are of something that sent light back: (N,)."""
+    place_m = np.stack([points[axis] for axis in PLACE], axis=1)
+    found: NDArray[np.bool_] = np.isfinite(place_m).all(axis=1) & place_m.any(axis=1)
+    return found
+
+
+def times_of(points: NDArray[np.void], name: str) -> NDArray[np.float64]:
+    """Return the times of points that count, as they are written: those that are finite of points that came back."""
+    values = points[name][returned(points)].astype(np.float64)
+    known: NDArray[np.float64] = values[np.isfinite(values)]
+    return known
 
 
 def _read_fields(extras: Extras, present: Iterable[str]) -> dict[str, tuple[str, ...]]:

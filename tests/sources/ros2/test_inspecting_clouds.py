@@ -13,9 +13,10 @@ from support.toy_world import street
 
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
+from semgrid_eval.sources.ros2.clouds_seen import TimesSeen
 from semgrid_eval.sources.ros2.convert import convert_bags
 from semgrid_eval.sources.ros2.inspection import inspect_bags
-from semgrid_eval.sources.ros2.mapping import load_map
+from semgrid_eval.sources.ros2.mapping import PointTimes, load_map
 from semgrid_eval.sources.ros2.options import Ros2Options
 
 PLACES = [(5.0, 1.0), (9.0, -2.0), (14.0, 3.0)]
@@ -76,6 +77,19 @@ def test_times_of_points_are_drafted_with_their_unit(tmp_path, maker):
     assert f"    times: {expected}  # of each point" in text
     assert yaml.safe_load(text)["lidars"]["top"]["cloud"] == "/velodyne/points"
     assert yaml.safe_load(text)["cameras"].keys() == {"front"}
+
+
+def test_the_unit_of_packets_is_that_in_which_they_fill_the_time_to_the_next_one():
+    packet = TimesSeen("t", 0.0, 500.0)
+    assert packet.guess(1.3e6) == PointTimes(field="t", unit="us")
+    assert packet.guess(None) == PointTimes(field="t", unit="ms")
+    assert TimesSeen("t", 0.0, 0.1).guess(5e9) == PointTimes(field="t", unit="s"), "clouds that were thinned out"
+
+
+def test_times_that_are_all_zero_tell_no_unit(tmp_path):
+    text = drafted(tmp_path, PLACE | {"t": np.zeros(4, np.uint32)})
+    assert "times" not in yaml.safe_load(text)["lidars"]["top"]
+    assert "    # times: {field: t, unit: , since: }  # the first cloud does not tell the unit of t; " in text
 
 
 def test_what_cannot_be_guessed_is_left_open(tmp_path):
