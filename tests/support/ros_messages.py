@@ -1,6 +1,7 @@
 """Messages of ROS 2 as `rosbags` has them, made for tests."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -119,6 +120,11 @@ def cloud(
         data=data.reshape(-1),
         is_dense=True,
     )
+
+
+def no_cloud(stamp_ns: int, frame: str = LIDAR) -> Any:
+    """Return a PointCloud2 as it is constructed: without points, and without fields."""
+    return replace(cloud(stamp_ns, np.zeros(0, [("x", "f4")]), frame=frame), fields=[], height=0, point_step=0)
 
 
 def odometry(stamp_ns: int, sample: MotionSample, pose: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Any:

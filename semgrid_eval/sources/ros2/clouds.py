@@ -1,7 +1,7 @@
 """Point clouds in messages: their fields by name, as columns of one row a point."""
 
 from collections.abc import Iterable
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +25,31 @@ def type_of(field: Any) -> str:  # noqa: ANN401 - a class that rosbags makes
     return name if field.count <= 1 else f"{field.count} x {name}"
 
 
-def require_layout(message: Any, lidar: LidarMap) -> None:  # noqa: ANN401
+class Extras(NamedTuple):
+    """The fields that are read beside place and intensity."""
+
+    label: str | None = None
+    time: str | None = None
+
+    @classmethod
+    def of(cls, lidar: LidarMap) -> "Extras":
+        """Return those that a map names."""
+        return cls(lidar.label_field, None if lidar.times is None else lidar.times.field)
+
+
+def is_empty(message: Any) -> bool:  # noqa: ANN401
+    """Return whether a cloud has neither points nor bytes, whatever fields it has: nothing was sent back."""
+    return message.width * message.height == 0 and not len(message.data)
+
+
+def require_layout(message: Any, extras: Extras) -> None:  # noqa: ANN401
     """Make sure that a cloud has the fields that are read, and the bytes that it says, before any array is made.
 
     Raises:
         InputError: it has not.
     """
     fields = {field.name: field for field in message.fields}
-    for name, types in _read_fields(lidar, fields).items():
+    for name, types in _read_fields(extras, fields).items():
         if name not in fields:
             raise InputError(f"has no field {name}; there are: {', '.join(fields) or 'none'}")
         if type_of(fields[name]) not in types:
@@ -43,15 +60,15 @@ def require_layout(message: Any, lidar: LidarMap) -> None:  # noqa: ANN401
     _require_size(message)
 
 
-def columns_of(message: Any, lidar: LidarMap) -> NDArray[np.void]:  # noqa: ANN401
+def columns_of(message: Any, extras: Extras) -> NDArray[np.void]:  # noqa: ANN401
     """Return the fields that are read (N,), row after row of an organised cloud, whatever rows end with.
 
     Raises:
         InputError: as `require_layout` does.
     """
-    require_layout(message, lidar)
+    require_layout(message, extras)
     fields = {field.name: field for field in message.fields}
-    names = list(_read_fields(lidar, fields))
+    names = list(_read_fields(extras, fields))
     order: Literal[">", "<"] = ">" if message.is_bigendian else "<"
     layout: Any = {
         "names": names,
@@ -65,15 +82,29 @@ def columns_of(message: Any, lidar: LidarMap) -> NDArray[np.void]:  # noqa: ANN4
     return points
 
 
-def _read_fields(lidar: LidarMap, present: Iterable[str]) -> dict[str, tuple[str, ...]]:
+def returned(points: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Return which points are of something that sent light back: (N,)."""
+    place_m = np.stack([points[axis] for axis in PLACE], axis=1)
+    found: NDArray[np.bool_] = np.isfinite(place_m).all(axis=1) & place_m.any(axis=1)
+    return found
+
+
+def times_of(points: NDArray[np.void], name: str) -> NDArray[np.float64]:
+    """Return the times of points that count, as they are written: those that are finite of points that came back."""
+    values = points[name][returned(points)].astype(np.float64)
+    known: NDArray[np.float64] = values[np.isfinite(values)]
+    return known
+
+
+def _read_fields(extras: Extras, present: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return the fields that are read, each with the types that it may have."""
     found: dict[str, tuple[str, ...]] = dict.fromkeys(PLACE, _REAL)
     if INTENSITY in present:
         found[INTENSITY] = NUMBERS
-    if lidar.label_field is not None:
-        found[lidar.label_field] = WHOLE
-    if lidar.times is not None:
-        found[lidar.times.field] = NUMBERS
+    if extras.label is not None:
+        found[extras.label] = WHOLE
+    if extras.time is not None:
+        found[extras.time] = NUMBERS
     return found
 
 

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semgrid_eval.sources.kitti.labels import CLASSES, classes_of
-from semgrid_eval.sources.ros2.clouds import NUMBERS, WHOLE, columns_of, type_of
+from semgrid_eval.sources.ros2.clouds import NUMBERS, WHOLE, Extras, columns_of, times_of, type_of
 from semgrid_eval.sources.ros2.labels import likely_ids
-from semgrid_eval.sources.ros2.lidars import LONGEST_NS, NS_BY_UNIT
-from semgrid_eval.sources.ros2.mapping import LidarMap, PointTimes
+from semgrid_eval.sources.ros2.lidars import LONGEST_NS, NS_BY_UNIT, fills
+from semgrid_eval.sources.ros2.mapping import PointTimes
 
 _TIME_NAMES = ("t", "time", "timestamp", "time_stamp", "time_offset", "offset_time")
 _LABEL_NAMES = ("label", "labels", "label_id", "class", "class_id", "semantic", "objtag")
@@ -20,13 +21,36 @@ _LAST_LABEL_ID = 33
 
 
 @dataclass(frozen=True)
+class TimesSeen:
+    """When points of a cloud were measured, in a unit that nothing but the values tells."""
+
+    field: str
+    first: float
+    span: float
+
+    def guess(self, period_ns: float | None) -> PointTimes | None:
+        """Guess the unit: that in which a cloud fills a period of its topic, else the longest that can be.
+
+        None where no unit can be, or each of them.
+        """
+        if not self.span:
+            return None
+        able = [unit for unit, unit_ns in NS_BY_UNIT.items() if self.span * unit_ns <= LONGEST_NS]
+        filling = [unit for unit in able if period_ns and fills(self.span * NS_BY_UNIT[unit], period_ns)]
+        for unit in (*filling, *able):
+            is_epoch = abs(self.first) * NS_BY_UNIT[unit] > _EPOCH_S * NS_BY_UNIT["s"]
+            return PointTimes(field=self.field, unit=unit, since="epoch" if is_epoch else "stamp")  # type: ignore[arg-type]
+        return None
+
+
+@dataclass(frozen=True)
 class CloudSeen:
     """What the first cloud of a topic tells."""
 
     fields: tuple[tuple[str, str], ...]  # names and types
     width: int
     height: int
-    times: PointTimes | None  # that tell when points were measured, as far as can be guessed
+    times: TimesSeen | None
     label_field: str | None
     ids: str  # what the labels look like
     highest_id: int
@@ -45,13 +69,12 @@ def look_at_cloud(message: Any) -> CloudSeen:  # noqa: ANN401 - a class that ros
     """
     fields = {field.name: type_of(field) for field in message.fields}
     time, label = _named(_TIME_NAMES, fields, NUMBERS), _named(_LABEL_NAMES, fields, WHOLE)
-    times = None if time is None else PointTimes(field=time, unit="s")
-    points = columns_of(message, LidarMap(cloud="/cloud", times=times, label_field=label))
+    points = columns_of(message, Extras(label, time))
     return CloudSeen(
         fields=tuple(fields.items()),
         width=message.width,
         height=message.height,
-        times=None if time is None else _times(time, points[time]),
+        times=None if time is None else _times(points, time),
         label_field=label,
         ids="" if label is None else _ids(points[label]),
         highest_id=0 if label is None else int(points[label].max(initial=0)),
@@ -63,16 +86,9 @@ def _named(names: Iterable[str], fields: dict[str, str], types: tuple[str, ...])
     return next((name for name, kind in fields.items() if name.lower() in names and kind in types), None)
 
 
-def _times(field: str, values: Any) -> PointTimes | None:  # noqa: ANN401 - an array (N,) of numbers
-    """Guess the unit: the longest in which a cloud takes no more than the longest turn."""
-    known = values.astype(np.float64)[np.isfinite(values)]
-    if not len(known):
-        return None
-    for unit, unit_ns in NS_BY_UNIT.items():
-        if np.ptp(known) * unit_ns <= LONGEST_NS:
-            is_epoch = abs(float(known[0])) * unit_ns > _EPOCH_S * NS_BY_UNIT["s"]
-            return PointTimes(field=field, unit=unit, since="epoch" if is_epoch else "stamp")  # type: ignore[arg-type]
-    return None
+def _times(points: NDArray[np.void], name: str) -> TimesSeen:
+    values = times_of(points, name)
+    return TimesSeen(name, float(values[0]), float(np.ptp(values))) if len(values) else TimesSeen(name, 0.0, 0.0)
 
 
 def _ids(ids: Any) -> str:  # noqa: ANN401 - an array (N,) of whole numbers

@@ -61,7 +61,8 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
     lost = sum((plan.lost for plan in plans), Counter[str]())
     total, kept = sum(plan.frames for plan in plans), sum(len(each.frames) for plan in plans for each in plan.stretches)
     what = "frames and sweeps" if mapping.lidars else "frames"
-    parts = [f"{kept} of {total} {what}; {told(lost)}", *_codings(plans[0])]
+    parts = [f"Warning: {odd}" for odd in next((plan.odd_times for plan in plans if plan.odd_times), [])]
+    parts += [f"{kept} of {total} {what}; {told(lost)}", *_codings(plans[0])]
     if repeated := sum(plan.repeated for plan in plans):
         parts.append(f"{repeated} messages with a stamp that was there before left out")
     unlabelled = [name for name, camera in mapping.cameras.items() if camera.labels is None]

@@ -3,10 +3,11 @@
 import re
 from collections.abc import Iterator
 
-from semgrid_eval.sources.ros2.clouds_seen import CloudSeen
+from semgrid_eval.sources.ros2.clouds_seen import CloudSeen, TimesSeen
 from semgrid_eval.sources.ros2.contents import Contents, Seen
 
 _ONLY = "top"
+_NS_PER_S = 1e9
 _GENERIC = {"points", "points_raw", "point_cloud", "pointcloud", "cloud", "packets", "lidar", "sensing"}
 
 
@@ -19,7 +20,7 @@ def draft_lidars(contents: Contents, vehicle: str) -> Iterator[str]:
         assert seen.cloud is not None
         yield f"  {name}:"
         yield f"    cloud: {topic}"
-        yield from _fields(seen.cloud)
+        yield from _fields(seen.cloud, seen.rate_hz)
         yield from place_lines(contents, vehicle, seen.frame or "the LiDAR", "it")
     for topic in sorted(_clouds(contents).keys() - swept.keys()):
         yield f"# {topic} has the frame of a camera, as points made of its pictures have: left out."
@@ -44,17 +45,24 @@ def lidar_names(contents: Contents) -> list[str]:
     return names if len(set(names)) == len(names) else [f"lidar{number}" for number in range(1, len(topics) + 1)]
 
 
-def _fields(cloud: CloudSeen) -> Iterator[str]:
-    if cloud.times is None:
-        yield "    # no times of points: all of a cloud count as measured at its stamp"
-    else:
-        times = cloud.times
-        yield f"    times: {{field: {times.field}, unit: {times.unit}, since: {times.since}}}  # of each point"
+def _fields(cloud: CloudSeen, rate_hz: float | None) -> Iterator[str]:
+    yield _times(cloud.times, rate_hz)
     if cloud.label_field is None:
         yield "    # no labels of points: a camera can colour them, `colour_from` of the sensor in a grid"
     else:
         yield f"    label_field: {cloud.label_field}"
         yield f"    ids: {cloud.ids}  # the first cloud holds ids up to {cloud.highest_id}; or names: {{road: [40]}}"
+
+
+def _times(seen: TimesSeen | None, rate_hz: float | None) -> str:
+    counted = "all of a cloud count as measured at its stamp"
+    if seen is None:
+        return f"    # no times of points: {counted}"
+    times = seen.guess(_NS_PER_S / rate_hz if rate_hz else None)
+    if times is None:
+        told = f"the first cloud does not tell the unit of {seen.field}; without times {counted}"
+        return f"    # times: {{field: {seen.field}, unit: , since: }}  # {told}"
+    return f"    times: {{field: {times.field}, unit: {times.unit}, since: {times.since}}}  # of each point"
 
 
 def place_lines(contents: Contents, vehicle: str, frame: str, sensor: str) -> Iterator[str]:

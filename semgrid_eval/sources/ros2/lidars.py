@@ -1,6 +1,7 @@
 """One LiDAR of a bag: where it sits, and sweeps of the log made of its clouds."""
 
 from dataclasses import asdict, dataclass
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -12,14 +13,17 @@ from semgrid_eval.motion import EgoMotion
 from semgrid_eval.recording.lidar import LidarSweep, Mount
 from semgrid_eval.sources.deskewing import deskewed
 from semgrid_eval.sources.kitti.labels import classes_of
-from semgrid_eval.sources.ros2.clouds import INTENSITY, PLACE, columns_of
+from semgrid_eval.sources.ros2.clouds import INTENSITY, PLACE, Extras, columns_of, is_empty, returned
 from semgrid_eval.sources.ros2.labels import LabelTable
 from semgrid_eval.sources.ros2.mapping import HIGHEST_POINT, LidarMap, PointTimes, VehicleMap
 from semgrid_eval.sources.ros2.scan import Facts
 
 NS_BY_UNIT = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}
+_NS_PER_MS = 1e6
 LONGEST_NS = 1e9
 """No turn of a LiDAR takes longer."""
+_SHARES = (0.05, 1.5)
+"""How much of the time from a cloud to the next one its points are measured in."""
 Columns = NDArray[np.void]
 
 
@@ -51,6 +55,23 @@ def plan_lidar(lidar: LidarMap, vehicle: VehicleMap, facts: Facts) -> LidarPlan:
     return LidarPlan(lidar, Mount.of(ego_from_frame @ frame_from_lidar))
 
 
+def fills(span_ns: float, period_ns: float) -> bool:
+    """Return whether the points of a cloud can be so far apart in time where clouds come so often."""
+    return _SHARES[0] * period_ns <= span_ns <= _SHARES[1] * period_ns
+
+
+def odd_times(name: str, lidar: LidarMap, facts: Facts) -> str:
+    """Say how the times of points disagree with how often clouds come; empty where they do not."""
+    stamps_ns, spans = facts.arrivals[lidar.cloud].stamps_ns, facts.spans.get(name)
+    if lidar.times is None or not spans or len(stamps_ns) < 2:
+        return ""
+    span_ns, period_ns = median(spans) * NS_BY_UNIT[lidar.times.unit], float(np.median(np.diff(stamps_ns)))
+    if fills(span_ns, period_ns):
+        return ""
+    told = f"a cloud of {name} takes {span_ns / _NS_PER_MS:.3g} ms by its {lidar.times.field}"
+    return f"{told} and one comes every {period_ns / _NS_PER_MS:.3g} ms: is `unit: {lidar.times.unit}` right?"
+
+
 class Sweeps:
     """Makes the sweeps of one LiDAR; `motion` is the vehicle's around them."""
 
@@ -64,14 +85,20 @@ class Sweeps:
         Raises:
             InputError: the cloud is not what the map says, or a label, time or place is impossible.
         """
-        points = columns_of(message, self._lidar)
+        if is_empty(message):
+            return self._empty(stamp_ns)
+        points = columns_of(message, Extras.of(self._lidar))
         place_m = np.stack([points[axis] for axis in PLACE], axis=1).astype(np.float64)
-        returned = np.isfinite(place_m).all(axis=1) & place_m.any(axis=1)
-        points = points[returned]
+        came_back = returned(points)
+        points = points[came_back]
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large then is refused
-            moved_m = self._at_stamp(place_m[returned], points, stamp_ns).astype(np.float32)
+            moved_m = self._at_stamp(place_m[came_back], points, stamp_ns).astype(np.float32)
             intensity = _intensity(points)
         return LidarSweep(stamp_ns, self._mount, moved_m, intensity, self._label_id(points))
+
+    def _empty(self, stamp_ns: int) -> LidarSweep:
+        label_id = None if self._lidar.label_field is None else np.zeros(0, np.uint8)
+        return LidarSweep(stamp_ns, self._mount, np.zeros((0, 3), np.float32), np.zeros(0, np.float32), label_id)
 
     def _at_stamp(self, place_m: NDArray[np.float64], points: Columns, stamp_ns: int) -> NDArray[np.float64]:
         if self._lidar.times is None:

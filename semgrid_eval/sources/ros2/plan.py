@@ -11,7 +11,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.sources.ros2.bag import Bag, name_of
 from semgrid_eval.sources.ros2.frames import FramePlan, covered, frames_of, stretches, sweeps_of
 from semgrid_eval.sources.ros2.kinds import IMU
-from semgrid_eval.sources.ros2.lidars import plan_lidar
+from semgrid_eval.sources.ros2.lidars import odd_times, plan_lidar
 from semgrid_eval.sources.ros2.mapping import BagMap
 from semgrid_eval.sources.ros2.motion import Floats, Rates, rates_of
 from semgrid_eval.sources.ros2.recording import AROUND_NS, Stretch
@@ -36,6 +36,7 @@ class BagPlan:
     frames: int = 0  # that have been recorded, of all cameras; sweeps of all LiDARs
     lost: Counter[str] = field(default_factory=Counter)  # frames that are left out, by what they lack
     repeated: int = 0  # messages with the stamp of another one
+    odd_times: list[str] = field(default_factory=list)  # what times of points disagree with, LiDAR by LiDAR
     fault: str = ""  # why there are no recordings
 
 
@@ -59,6 +60,8 @@ def _fill(plan: BagPlan, path: Path, mapping: BagMap, cut: Cut, facts: Facts) ->
     rates = _rates(mapping, facts)
     rigs = {name: plan_rig(camera, mapping.vehicle, facts) for name, camera in mapping.cameras.items()}
     lidars = {name: plan_lidar(lidar, mapping.vehicle, facts) for name, lidar in mapping.lidars.items()}
+    odd = (odd_times(name, lidar, facts) for name, lidar in mapping.lidars.items())
+    plan.odd_times = [each for each in odd if each]
     by_sensor = _frames(plan, mapping, facts, rates)
     stretch = partial(
         Stretch,

@@ -5,18 +5,21 @@ from dataclasses import dataclass, field
 from hashlib import blake2b
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from semgrid_eval.errors import InputError, located
 from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.arrivals import Arrivals, Ledger
 from semgrid_eval.sources.ros2.bag import Arrival, Bag
 from semgrid_eval.sources.ros2.cameras import Info
-from semgrid_eval.sources.ros2.clouds import require_layout
-from semgrid_eval.sources.ros2.mapping import BagMap
+from semgrid_eval.sources.ros2.clouds import Extras, columns_of, is_empty, require_layout, times_of
+from semgrid_eval.sources.ros2.mapping import BagMap, LidarMap
 from semgrid_eval.sources.ros2.motion import Track, values_of
 from semgrid_eval.sources.ros2.pictures import Shape, require_coding, shape_of
 from semgrid_eval.sources.ros2.transforms import Transforms
 
 _NS_PER_S = 1_000_000_000
+_CLOUDS_TIMED = 20
 
 
 class Use(NamedTuple):
@@ -44,6 +47,7 @@ class Facts:
     stereo: dict[str, Stereo] = field(default_factory=dict)
     tracks: dict[str, Track] = field(default_factory=dict)  # by use: speed, yaw_rate
     kinds: dict[str, str] = field(default_factory=dict)  # message types
+    spans: dict[str, list[float]] = field(default_factory=dict)  # of times in each of the first clouds, by LiDAR
     transforms: Transforms = field(default_factory=Transforms)
 
 
@@ -149,9 +153,18 @@ class _Scanner:
 
     def _cloud(self, topic: str, stamp_ns: int, message: Any) -> None:  # noqa: ANN401
         with located(field=f"{topic} at {stamp_ns} ns"):
-            for lidar in self._mapping.lidars.values():
-                if lidar.cloud == topic:
-                    require_layout(message, lidar)
+            for name, lidar in self._mapping.lidars.items():
+                if lidar.cloud == topic and not is_empty(message):
+                    require_layout(message, Extras.of(lidar))
+                    self._span(name, lidar, message)
+
+    def _span(self, name: str, lidar: LidarMap, message: Any) -> None:  # noqa: ANN401
+        spans = self._facts.spans.setdefault(name, [])
+        if lidar.times is None or len(spans) == _CLOUDS_TIMED:
+            return
+        values = times_of(columns_of(message, Extras.of(lidar)), lidar.times.field)
+        if len(values):
+            spans.append(float(np.ptp(values)))
 
 
 def stamp_of(message: Any) -> int:  # noqa: ANN401

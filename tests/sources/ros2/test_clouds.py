@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 from support.ros_messages import cloud
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.sources.ros2.clouds import columns_of
-from semgrid_eval.sources.ros2.mapping import LidarMap, PointTimes
+from semgrid_eval.sources.ros2.clouds import Extras, columns_of
 
-MAP = LidarMap(cloud="/points", times=PointTimes(field="t", unit="ns"), label_field="label")
+READ = Extras(label="label", time="t")
 TYPES = [("t", "u4"), ("x", "f4"), ("pad", "u1"), ("y", "f4"), ("z", "f4"), ("label", "u2"), ("ring", "u1")]
 
 
@@ -27,7 +26,7 @@ def points(count=6, types=TYPES):
 @pytest.mark.parametrize("place", ["f4", "f8"])
 def test_fields_are_read_by_name_whatever_their_order_and_what_rows_end_with(big, rows, padding, place):
     types = [(name, place if name in "xyz" else each) for name, each in TYPES]
-    found = columns_of(cloud(1, points(types=types), rows=rows, padding=padding, big=big), MAP)
+    found = columns_of(cloud(1, points(types=types), rows=rows, padding=padding, big=big), READ)
     assert found.dtype.names == ("x", "y", "z", "label", "t")
     for name in found.dtype.names:
         assert found[name].tolist() == points()[name].tolist()
@@ -35,13 +34,12 @@ def test_fields_are_read_by_name_whatever_their_order_and_what_rows_end_with(big
 
 def test_intensity_is_read_where_there_is_one():
     types = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "u1")]
-    bare = LidarMap(cloud="/points")
-    assert columns_of(cloud(1, points(types=types)), bare)["intensity"].tolist() == [30, 31, 32, 33, 34, 35]
-    assert columns_of(cloud(1, points(types=types[:3])), bare).dtype.names == ("x", "y", "z")
+    assert columns_of(cloud(1, points(types=types)), Extras())["intensity"].tolist() == [30, 31, 32, 33, 34, 35]
+    assert columns_of(cloud(1, points(types=types[:3])), Extras()).dtype.names == ("x", "y", "z")
 
 
 def test_a_cloud_may_have_no_points():
-    assert len(columns_of(cloud(1, points(0)), MAP)) == 0
+    assert len(columns_of(cloud(1, points(0)), READ)) == 0
 
 
 def renamed(message, old, **changes):
@@ -75,7 +73,7 @@ FAULTS = {
 def test_a_cloud_that_is_not_what_it_says_is_refused_before_anything_is_made_of_it(name):
     message, line = FAULTS[name]
     with pytest.raises(InputError) as raised:
-        columns_of(message, MAP)
+        columns_of(message, READ)
     assert str(raised.value) == line
 
 
@@ -88,10 +86,10 @@ def test_whatever_a_cloud_says_of_its_size_there_are_points_or_a_line(width, hei
     changes = {"width": width, "height": height, "point_step": point_step, "row_step": row_step}
     message = replace(WHOLE, **changes, data=np.resize(WHOLE.data, count))
     with suppress(InputError):
-        assert len(columns_of(message, MAP)) == width * height
+        assert len(columns_of(message, READ)) == width * height
 
 
 @given(st.sampled_from("xyzt"), NUMBER, st.integers(0, 255), st.integers(0, 2**32 - 1))
 def test_whatever_a_cloud_says_of_its_fields_there_are_points_or_a_line(name, offset, datatype, count):
     with suppress(InputError):
-        assert len(columns_of(renamed(WHOLE, name, offset=offset, datatype=datatype, count=count), MAP)) == 6
+        assert len(columns_of(renamed(WHOLE, name, offset=offset, datatype=datatype, count=count), READ)) == 6

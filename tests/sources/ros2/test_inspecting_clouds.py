@@ -7,15 +7,16 @@ import pytest
 import yaml
 from support.bags import LATE_NS, RecordingBag, Sent, write_bag
 from support.rig_bags import Coding, RigBag
-from support.ros_messages import OPTICAL, cloud
+from support.ros_messages import OPTICAL, cloud, no_cloud
 from support.swept import START_NS, Drive, recorded, scanned
 from support.toy_world import street
 
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
+from semgrid_eval.sources.ros2.clouds_seen import TimesSeen
 from semgrid_eval.sources.ros2.convert import convert_bags
 from semgrid_eval.sources.ros2.inspection import inspect_bags
-from semgrid_eval.sources.ros2.mapping import load_map
+from semgrid_eval.sources.ros2.mapping import PointTimes, load_map
 from semgrid_eval.sources.ros2.options import Ros2Options
 
 PLACES = [(5.0, 1.0), (9.0, -2.0), (14.0, 3.0)]
@@ -78,6 +79,19 @@ def test_times_of_points_are_drafted_with_their_unit(tmp_path, maker):
     assert yaml.safe_load(text)["cameras"].keys() == {"front"}
 
 
+def test_the_unit_of_packets_is_that_in_which_they_fill_the_time_to_the_next_one():
+    packet = TimesSeen("t", 0.0, 500.0)
+    assert packet.guess(1.3e6) == PointTimes(field="t", unit="us")
+    assert packet.guess(None) == PointTimes(field="t", unit="ms")
+    assert TimesSeen("t", 0.0, 0.1).guess(5e9) == PointTimes(field="t", unit="s"), "clouds that were thinned out"
+
+
+def test_times_that_are_all_zero_tell_no_unit(tmp_path):
+    text = drafted(tmp_path, PLACE | {"t": np.zeros(4, np.uint32)})
+    assert "times" not in yaml.safe_load(text)["lidars"]["top"]
+    assert "    # times: {field: t, unit: , since: }  # the first cloud does not tell the unit of t; " in text
+
+
 def test_what_cannot_be_guessed_is_left_open(tmp_path):
     text = drafted(tmp_path, PLACE)
     assert "    # no times of points: all of a cloud count as measured at its stamp\n" in text
@@ -123,7 +137,11 @@ def test_several_lidars_are_named_by_their_topics(tmp_path):
 def test_a_cloud_that_cannot_be_read_is_told_and_not_drafted(tmp_path):
     messages = list(RecordingBag(street(1, frames=3).recording()).messages())
     points = np.zeros(2, [("range", "f4")])
-    sent = Sent("/ranges", messages[-1].received_ns, cloud(START_NS + LATE_NS, points))
-    said, text = inspected(tmp_path, [*messages, sent])
+    sent = [
+        Sent("/ranges", messages[-1].received_ns, cloud(START_NS + LATE_NS, points)),
+        Sent("/nothing", messages[-1].received_ns, no_cloud(START_NS + LATE_NS)),
+    ]
+    said, text = inspected(tmp_path, [*messages, *sent])
     assert "has no field x; there are: range" in said
+    assert "has no field x; there are: none" in said
     assert "lidars:" not in text

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from support.ros_messages import cloud, transforms
+from support.ros_messages import cloud, no_cloud, transforms
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import SE3
@@ -60,6 +60,14 @@ def sweep(columns, lidar=BARE, motion=()):
 
 def columns(*places, **more):
     return {**dict(zip("xyz", np.array(places, np.float32).T, strict=True)), **more}
+
+
+@pytest.mark.parametrize("label", [None, "label"])
+def test_a_cloud_without_points_is_an_empty_sweep_whatever_fields_it_lacks(label):
+    lidar = LidarMap(cloud="/points", label_field=label, times=PointTimes(field="t", unit="ns"))
+    found = Sweeps(LidarPlan(lidar, mount()), EgoMotion((), "arc")).sweep(STAMP_NS, no_cloud(STAMP_NS))
+    assert (found.points_m.shape, found.intensity.shape) == ((0, 3), (0,))
+    assert (found.label_id is None) == (label is None)
 
 
 def test_points_of_nothing_are_left_out_with_what_belongs_to_them():

@@ -203,6 +203,33 @@ def test_clouds_of_any_coding_give_the_sweeps_that_they_were_made_of(tmp_path, n
         assert np.allclose(sweep.mount.turn, expected.mount.turn)
 
 
+@pytest.mark.parametrize(("unit", "takes"), [("us", "0.09"), ("ms", ""), ("s", None)])
+def test_a_unit_of_times_that_disagrees_with_how_often_clouds_come_is_warned_of(tmp_path, unit, takes):
+    bag = RigBag(scanned(DRIVE, range(0, 3 * LIDAR_NS, LIDAR_NS), PLACES))
+    messages = []
+    for each in bag.messages():
+        if each.topic == "/top/points":
+            points = np.ones(len(PLACES), [(name, "f4") for name in ("x", "y", "z", "t")] + [("label", "u2")])
+            points["t"] = np.linspace(0, 0.9 if unit == "s" else 90, len(PLACES))
+            each = each._replace(message=ros.cloud(stamp_of(each), points, frame="top"))
+        messages.append(each)
+    _, summary = converted(tmp_path, messages, bag.map_text(f"times: {{field: t, unit: {unit}}}"))
+    told = (
+        f"Warning: a cloud of top takes {takes or 900} ms by its t and one comes every 100 ms: is `unit: {unit}` right?"
+    )
+    assert summary.remark.startswith(told) == (takes != "")
+
+
+def test_a_cloud_without_points_and_fields_between_others_is_an_empty_sweep(tmp_path):
+    bag = RigBag(scanned(DRIVE, range(0, 3 * LIDAR_NS, LIDAR_NS), PLACES))
+    messages = list(bag.messages())
+    second = [place for place, sent in enumerate(messages) if sent.topic == "/top/points"][1]
+    messages[second] = messages[second]._replace(message=ros.no_cloud(stamp_of(messages[second]), frame="top"))
+    log, _ = converted(tmp_path, messages, bag.map_text())
+    with LogReader(log) as reader:
+        assert [len(sweep.points_m) for sweep in reader.sweeps("top")] == [len(PLACES), 0, len(PLACES)]
+
+
 def test_sweeps_without_labels_come_into_the_log_and_what_is_missing_is_said(tmp_path):
     bag = RigBag(scanned(DRIVE, range(0, 3 * LIDAR_NS, LIDAR_NS), PLACES), Coding(labels=""))
     log, summary = converted(tmp_path, bag.messages(), bag.map_text())
