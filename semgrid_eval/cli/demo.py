@@ -23,7 +23,7 @@ TOWNS = 8
 @workers_option("Processes at once.")
 @loudness_options
 def command(out: Path, recordings: int, seed: int, device: str, workers: int) -> int:
-    """Simulate a town, record drives through it as logs, train, score and report: some ten minutes on two cores.
+    """Simulate a town, record drives through it as logs, train, score and report: some eight minutes on two cores.
 
     Prints the path of the finished page. Finished work is kept; run the same command again to continue.
     """
@@ -31,7 +31,7 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
     from semgrid_eval.config import parse_config
     from semgrid_eval.executors import local_executor
     from semgrid_eval.log.convert import Work
-    from semgrid_eval.models.device import choose_device
+    from semgrid_eval.models.device import choose_device, visible_gpus
     from semgrid_eval.report.page.write import write_report
     from semgrid_eval.runs.matrix import load_matrix
     from semgrid_eval.runs.runner import RunOptions, run_matrix
@@ -43,7 +43,9 @@ def command(out: Path, recordings: int, seed: int, device: str, workers: int) ->
     logs, run = out / "logs", out / "run"
     config = parse_config(SyntheticConfig, {"recordings": recordings, "seed": seed, "towns": TOWNS})
     code = show(convert_town(config, logs, Work(workers, stage=progress)), logs)
-    options = RunOptions(device, out / "grids", command_line(), grid_executor=local_executor(workers))
+    shared = visible_gpus() if device in ("auto", "cuda") else ()
+    rows_on, grids_on = local_executor(workers, gpus=shared), local_executor(workers)
+    options = RunOptions(device, out / "grids", command_line(), executor=rows_on, grid_executor=grids_on)
     record = run_matrix(load_matrix(PRESET), logs, run, options, stage=progress)
     page = write_report(run)
     code |= show_run(record, {row.name for row in record.rows})
