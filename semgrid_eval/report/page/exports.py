@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 import pandas as pd
 
 from semgrid_eval import __version__
@@ -162,8 +161,9 @@ def summary_frame(records: Records) -> pd.DataFrame:
 
 def seed_frame(everything: Everything) -> pd.DataFrame:
     """Return one line for every figure of every row and seed."""
-    parts = [_seeds(entry, place) for place, scores in _regions(everything) for entry in scores.values()]
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(FIGURE_COLUMNS))
+    scored = ((place, entry) for place, scores in _regions(everything) for entry in scores.values())
+    lines = [line for place, entry in scored for line in _seeds(entry, place)]
+    return pd.DataFrame(lines, columns=list(FIGURE_COLUMNS)).astype({"seed": "Int64"})
 
 
 def division_records(everything: Everything) -> Records:
@@ -207,9 +207,9 @@ def _estimate(estimate: Estimate) -> dict[str, float | None]:
     return {name: finite(value) for name, value in vars(estimate).items()}
 
 
-def _seeds(entry: RowScores, place: dict[str, str]) -> pd.DataFrame:
-    columns = column_names(entry.metric)
-    seed = pd.array([result.record.seed for result in entry.results], dtype="Int64").repeat(len(columns))
-    frame = pd.DataFrame({"seed": seed, "column": list(columns) * len(entry.results), "value": entry.by_seed.ravel()})
-    cells = np.asarray(entry.metric.cells(entry.totals)).ravel()
-    return frame.assign(row=entry.row.name, **place, cells=cells, windows=entry.windows)[list(FIGURE_COLUMNS)]
+def _seeds(entry: RowScores, place: dict[str, str]) -> Iterator[dict[str, Any]]:
+    shared = {**place, "row": entry.row.name, "windows": entry.windows}
+    of_seeds = zip(entry.results, entry.by_seed.tolist(), entry.metric.cells(entry.totals).tolist(), strict=True)
+    for result, values, cells in of_seeds:
+        for column, value, count in zip(column_names(entry.metric), values, cells, strict=True):
+            yield {**shared, "seed": result.record.seed, "column": column, "value": value, "cells": count}
