@@ -38,7 +38,7 @@ reference: $(READY)  ## the paper's table on the simulated town: 15 trainings, t
 	for command in $(REFERENCE_COMMANDS); do $(BIN)/semgrid-eval $$command || exit 1; done
 	$(BIN)/python tools/reference_readme.py $(REFERENCE)/run $(REFERENCE_REPORT) $(REFERENCE_COMMANDS)
 
-test: $(READY)  ## the suite, but for what takes more than ten seconds a test
+test: $(READY)  ## the suite, but for what takes more than three seconds a test
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
 
 test-slow: $(READY)  ## the rest of it: whole chains, kills, clusters, pages run from end to end

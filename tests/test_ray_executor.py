@@ -12,6 +12,8 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.executors import InProcess, WorkerDied, thread_variables
 from semgrid_eval.scores.sums import read_sums
 
+pytestmark = pytest.mark.slow
+
 ray = pytest.importorskip("ray", reason="the extra 'ray' is not installed")
 ray.cloudpickle.register_pickle_by_value(pieces)  # the cluster's processes cannot import it
 

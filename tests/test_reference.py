@@ -45,6 +45,7 @@ def test_the_page_of_reports_names_the_preset_that_is_run_and_how_many_networks_
     assert f": {networks} trainings" in (ROOT / "Makefile").read_text()
 
 
+@pytest.mark.slow
 def test_the_readme_names_commands_scores_and_verdicts(tmp_path):
     run = make_fake_run(tmp_path / "run")
     report = write_report([run], tmp_path / "report").parent

@@ -219,6 +219,7 @@ def command(*arguments):
     assert not done.return_value, done.output
 
 
+@pytest.mark.slow
 def test_what_is_added_in_one_file_each_stands_in_a_finished_report(added):
     (added / "m.yaml").write_text(yaml.safe_dump(MATRIX))
     command("convert", "lane", "logs", "--workers", 1, "--speed-mps", "7")

@@ -13,6 +13,7 @@ from semgrid_eval.executors import InProcess
 CPU = torch.device("cpu")
 
 
+@pytest.mark.slow
 def test_what_fails_is_told_and_the_rest_is_measured(monkeypatch):
     def fail(*_args, **_kwargs):
         raise RuntimeError("no compiler\nand more")

@@ -48,6 +48,7 @@ def test_every_part_is_measured_printed_and_written(tiny, tmp_path):
     assert {"torch", "eclipse-sumo", "cpu_cores"} <= told["conditions"].keys()
 
 
+@pytest.mark.slow
 def test_the_example_measures_the_parts_that_it_names(tiny):
     _, *arguments = shlex.split(bench.command.epilog.removeprefix("Example: "))
     done = CliRunner().invoke(cli, arguments)

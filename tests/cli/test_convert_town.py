@@ -97,6 +97,7 @@ def test_an_unpublished_benchmark_tells_its_digest_and_its_logs_carry_its_name(r
         assert log.scene.dataset == "town-v1/small"
 
 
+@pytest.mark.slow
 def test_two_workers_elsewhere_render_the_published_bytes(rendered, define, tmp_path, capsys):
     out, _ = rendered
     define(published(out))
@@ -141,6 +142,7 @@ def test_logs_that_do_not_belong_are_a_warning(rendered, define, tmp_path, capsy
     assert f"Warning: {tmp_path} holds 1 logs that do not belong to this conversion, such as {stray}" in lines
 
 
+@pytest.mark.slow
 def test_the_benchmark_of_rigs_has_their_sensors(tmp_path, monkeypatch):
     def with_lidar(name):
         return tiny().model_copy(update={"name": name, "rig": "front+lidar"})

@@ -89,6 +89,7 @@ def before_and_after(tmp_path_factory):
     return folder / "before", folder / "after"
 
 
+@pytest.mark.slow
 def test_a_gate_that_fails_is_exit_code_1_with_a_line_for_each_limit_and_the_page(before_and_after, tmp_path, capsys):
     limits = ("--fail-below", "mean_known: -0.01", "--fail-below", "road:-1")
     code, out, err = _run(capsys, "report", *before_and_after, *limits, "--out", tmp_path / "page")

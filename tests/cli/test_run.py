@@ -89,6 +89,7 @@ def test_dry_run_tells_updates_and_minutes_and_trains_nothing(here):
     assert call(*arguments, "--dry-run").stdout.count("\tdone") == 2
 
 
+@pytest.mark.slow
 def test_dry_run_counts_only_the_epochs_that_are_not_trained_yet(here):
     rows = [{"name": "ED-DC", "model": "ed"}]
     (here / "trainings").mkdir()
@@ -101,6 +102,7 @@ def test_dry_run_counts_only_the_epochs_that_are_not_trained_yet(here):
     assert call(*planned).stdout.splitlines()[1].split("\t")[3:5] == ["3", "6"]
 
 
+@pytest.mark.slow
 def test_dry_run_counts_a_training_that_rows_share_once(here):
     rows = [{"name": "ED-DC", "model": "ed"}, {"name": "ED-all", "model": "ed", "mask_mode": "off"}]
     planned = call("run", matrix(here, rows), "--logs", "logs", "--out", "run", "--dry-run").stdout.splitlines()
@@ -130,6 +132,7 @@ def unlabelled(recording):
     return replace(recording, moments=moments)
 
 
+@pytest.mark.slow
 def test_whatever_fails_is_one_line_each_and_the_others_go_on(here, tmp_path_factory):
     logs = tmp_path_factory.mktemp("unlabelled")
     write_log(street(1, frames=9).recording("good", "val"), logs / "good.mcap")
@@ -195,6 +198,7 @@ def test_a_users_mistake_is_one_line_without_a_traceback(here, capsys, arguments
     assert message in lines[0]
 
 
+@pytest.mark.slow
 def test_what_is_damaged_is_made_again_with_a_line_each(here, capsys):
     arguments = ["run", matrix(here, [{"name": "BL-DC", "model": "newest"}]), "--logs", "logs", "--out", "run"]
     kinds = {"results/*/sums.npz": "result is", "windows/*.npz": "windows are", "grids/*.npz": "grids are"}
@@ -213,6 +217,7 @@ def test_what_is_damaged_is_made_again_with_a_line_each(here, capsys):
         assert [line for line in said if pattern.partition("/")[0] in line and f"the {word}" in line], said
 
 
+@pytest.mark.slow
 def test_a_model_that_ends_its_process_is_a_row_that_fails(here, capsys):
     (here / "mine.py").write_text("import os\nos._exit(4)\n")
     rows = [{"name": "mine", "model": "mine.py:Mine"}, {"name": "BL", "model": "newest"}]

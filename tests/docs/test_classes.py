@@ -23,6 +23,8 @@ from semgrid_eval.scores import results
 from semgrid_eval.scores.sums import read_sums
 from semgrid_eval.scores.tidy import load_figures
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("unknown", "drivable", "walkable", "fixed", "vehicle", "pedestrian")
 CATEGORIES = ("surface", "obstacle", "traffic", "people")
 RUN, REPORT, PLAY = commands(PAGE)

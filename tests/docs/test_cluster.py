@@ -2,6 +2,7 @@
 
 import shutil
 
+import pytest
 from support.small_runs import run, write_logs
 from support.spread import contents
 
@@ -14,6 +15,7 @@ def times(folder):
     return {path: path.stat().st_mtime_ns for path in folder.rglob("*.npz")}
 
 
+@pytest.mark.slow
 def test_rows_that_were_run_apart_are_found_in_one_folder(tmp_path):
     whole = tmp_path / "whole" / "run"
     for name, only in (("first", ("BL-*",)), ("second", ("ED",))):

@@ -43,6 +43,7 @@ def run(folder):
             assert ended.code == 0, f"{line}\n{ended.err}"
 
 
+@pytest.mark.slow
 def test_commands_for_kitti(workplace):
     ground = tuple((float(x), float(y), -1.6) for x in range(4, 40) for y in range(-6, 7))
     for name in ("05", "07"):
@@ -56,6 +57,7 @@ def test_commands_for_kitti(workplace):
     assert run_command(words).code == 0
 
 
+@pytest.mark.slow
 def test_commands_for_argoverse(workplace):
     pytest.importorskip("pyarrow", reason="the extra `argoverse` is not installed")
     pytest.importorskip("onnxruntime", reason="the extra `segment` is not installed")

@@ -40,6 +40,7 @@ def workplace(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_every_command_of_the_page_runs_in_its_order(workplace):
     program, *others = commands(PAGE)
     made = subprocess.run([sys.executable, *program.split()[1:]], capture_output=True, text=True, check=True)

@@ -89,6 +89,7 @@ def test_model_of_ones_own_loads_its_weights_and_gives_probabilities(tmp_path):
     torch.testing.assert_close(answer.sum(dim=1), torch.ones(2, 16, 16))
 
 
+@pytest.mark.slow
 def test_python_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_log(street(1, frames=26, noise_px=0.05).recording(), tmp_path / "logs" / "val" / "toy.mcap")

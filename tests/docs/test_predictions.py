@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 import yaml
 from support.pages import blocks, text_of
 from support.small_runs import run
@@ -17,6 +18,7 @@ from semgrid_eval.scores.sums import read_sums
 PAGE = text_of("docs/predictions.md")
 
 
+@pytest.mark.slow
 def test_the_example_writes_logs_that_its_rows_score(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_log(street(1, frames=27, speed_mps=12.0).recording("toy", "train"), Path("logs/train/toy.mcap"))

@@ -19,6 +19,7 @@ def compiler():
     return module
 
 
+@pytest.mark.slow
 def test_compiled_schemas_are_those_of_the_sources():
     try:
         assert compiler().is_current(), "run: python tools/compile_schemas.py"

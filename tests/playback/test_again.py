@@ -21,6 +21,8 @@ from semgrid_eval.playback.export import export_predictions
 from semgrid_eval.playback.write import Play, write_playback
 from semgrid_eval.scores import results
 
+pytestmark = pytest.mark.slow
+
 ROWS = [
     {"name": "newest", "model": "newest"},
     {"name": "ed", "model": "ed"},

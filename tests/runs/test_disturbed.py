@@ -13,6 +13,8 @@ from semgrid_eval.runs.runner import RunOptions, make_worker
 from semgrid_eval.scores import results
 from semgrid_eval.scores.sums import SUMS_FILE, read_sums
 
+pytestmark = pytest.mark.slow
+
 KINDS = {
     "lost": {"kind": "lost_frame"},
     "patches": {"kind": "mislabelled", "strength": 0.3},

@@ -55,6 +55,7 @@ def test_a_group_that_no_recording_has_fails_the_row_alone(logs, tmp_path):
     assert right.failure is None
 
 
+@pytest.mark.slow
 def test_rows_that_differ_in_the_horizon_share_a_training_of_mixed_leads(logs, tmp_path):
     base = {"model": "residual", "train_leads": [1, 6], "window": {**WINDOW, "inputs": 1}}
     settings = {"widths": [4, 4], "fine": 0, "lead_input": True}

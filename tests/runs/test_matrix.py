@@ -85,6 +85,7 @@ def test_rows_override_defaults_key_by_key(tmp_path):
     assert row.label == "a (newest input, moved to the target's time, 2 inputs, 2 steps of 3 frames ahead)"
 
 
+@pytest.mark.slow
 def test_models_of_ones_own_are_rows_with_the_matrix_s_defaults(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "lib").mkdir()
@@ -100,6 +101,7 @@ def test_models_of_ones_own_are_rows_with_the_matrix_s_defaults(tmp_path, monkey
         load_matrix("smoke", models=["de"])
 
 
+@pytest.mark.slow
 def test_an_installed_model_is_a_row_and_is_looked_for_only_where_one_is_asked_for(tmp_path, monkeypatch):
     looked_for = []
 
@@ -296,6 +298,7 @@ class Own(Network):
 """
 
 
+@pytest.mark.slow
 def test_settings_of_ones_own_network_are_axes_and_checked_where_its_code_can_be_loaded(tmp_path):
     (tmp_path / "own.py").write_text(OWN)
     model = f"{tmp_path}/own.py:Own"

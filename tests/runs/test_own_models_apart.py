@@ -148,6 +148,7 @@ def test_what_hangs_is_ended_after_the_limit_and_the_rest_goes_on(logs, tmp_path
     assert record.rows[1].failure is None
 
 
+@pytest.mark.slow
 def test_what_is_printed_or_doubled_changes_nothing(logs, tmp_path, capfd):
     record = run(rows_of(tmp_path, RUDE, "Newest", "Talks", "Doubles"), logs, tmp_path / "run")
     assert [row.failure for row in record.rows] == [None] * 4
@@ -158,6 +159,7 @@ def test_what_is_printed_or_doubled_changes_nothing(logs, tmp_path, capfd):
     assert "and another" in errors
 
 
+@pytest.mark.slow
 def test_a_file_that_ends_its_process_is_told_of_once_for_all_its_rows(logs, tmp_path):
     rows = rows_of(tmp_path, f"import os\nopen({str(tmp_path / 'times')!r}, 'a').write('x')\nos._exit(3)", "Mine")
     record = run([{**rows[0], "name": f"own{n}"} for n in range(3)] + rows[1:], logs, tmp_path / "run")

@@ -49,6 +49,7 @@ def test_a_run_on_packed_grids_is_the_run_on_logs(folders, tmp_path):
         assert (first == second).all()
 
 
+@pytest.mark.slow
 def test_processes_read_packed_grids(folders, tmp_path):
     record = run([ROWS[0], {"name": "BL-DC", "model": "newest"}], folders[1], tmp_path / "run", Processes(2))
     assert [row.failure for row in record.rows] == [None, None]

@@ -12,6 +12,8 @@ from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.scores import results
 from semgrid_eval.sources.town.rendering import render_recording
 
+pytestmark = pytest.mark.slow
+
 ALL = ["front", "left", "right", "rear", "lidar"]
 
 

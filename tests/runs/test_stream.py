@@ -86,6 +86,7 @@ def test_a_second_run_finds_everything(done, logs):
     assert {row.results[0] for row in again.rows} == {result.id for result in found.values()}
 
 
+@pytest.mark.slow
 def test_the_page_shows_strategies_and_the_best_lead_can_be_taken(done, tmp_path):
     out, _ = done
     page = write_report(out, tmp_path / "report").read_text()
@@ -193,6 +194,7 @@ def test_a_stream_is_evaluated_as_often_as_it_says(logs, tmp_path):
         assert [line["evaluations"] for line in csv.DictReader(file)] == ["2", "6"]
 
 
+@pytest.mark.slow
 def test_two_processes_give_the_same_numbers_as_one(logs, tmp_path):
     profile = {
         "format": 1,

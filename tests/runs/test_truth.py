@@ -141,6 +141,7 @@ def test_a_plan_says_which_rows_are_skipped_for_lack_of_a_truth(tmp_path):
     assert not any(unit.failure for unit in found.values())
 
 
+@pytest.mark.slow
 def test_processes_give_the_same_as_this_one(out, logs, tmp_path):
     run([PLAIN[0], TOLD[0]], logs, tmp_path / "run", Processes(2), second_target="expected")
     for name in ("BL-DC", "top"):

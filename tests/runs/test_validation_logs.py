@@ -26,6 +26,7 @@ def test_recordings_of_another_frame_rate_are_scored_in_windows_of_their_own(log
     assert [window.target_frame for window in result.windows] == [4, 5, 6, 7, 8] * 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("executor", [InProcess(), Processes(2, threads=torch.get_num_threads())])
 def test_logs_of_another_folder_are_scored_with_the_networks_that_another_run_trained(logs, tmp_path, executor):
     write_log(street(5, frames=7).recording("real", "val"), tmp_path / "real" / "real.mcap")

@@ -90,6 +90,7 @@ def test_pictures_have_the_shape_of_their_log(place):
     assert len(shapes) == 2
 
 
+@pytest.mark.slow
 def test_a_report_is_written_and_every_recording_played(place):
     call("report", place / "run")
     assert (place / "run" / "report" / "index.html").stat().st_size > 10_000

@@ -40,6 +40,7 @@ def test_each_stage_is_measured_over_each_quantity_and_drawn(tmp_path):
     assert (tmp_path / "again" / "cost.svg").read_text() == drawn
 
 
+@pytest.mark.slow
 def test_the_figures_of_the_page_are_those_that_are_kept(tmp_path):
     docs = TOOL.parents[1] / "docs"
     said = call("--drawn", docs / "cost.json", "--out", tmp_path)

@@ -125,6 +125,7 @@ def test_archives_of_a_run_stay_below_what_comes_through(tmp_path, monkeypatch):
     assert packed == [["run/trainings/0"], ["run/trainings/1", "run/trainings/2"], ["run/trainings/3"]]
 
 
+@pytest.mark.slow
 def test_parts_that_fail_or_take_too_long_are_told_and_the_next_begins(tmp_path):
     code, printed = check(tmp_path / "nothing", tmp_path, "rates:0.2", "paper:120")
     assert code == 1

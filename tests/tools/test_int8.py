@@ -25,6 +25,7 @@ def call(folder, rows, **defaults):
     return subprocess.run([*command, "--windows", "2", "--calibrated", "2"], capture_output=True, text=True)
 
 
+@pytest.mark.slow
 def test_each_way_is_compared_with_eager_float32(tmp_path):
     write_logs(tmp_path / "logs")
     done = call(tmp_path, ROWS)
@@ -44,6 +45,7 @@ def test_each_way_is_compared_with_eager_float32(tmp_path):
     assert re.findall(r"^\| (\w+) \| ms", done.stdout, re.MULTILINE) == ["ED", "RN"]
 
 
+@pytest.mark.slow
 def test_what_is_scored_is_not_calibrated_on(tmp_path):
     write_logs(tmp_path / "logs")
     done = call(tmp_path, ROWS[:1], train_split="val")

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from support.fake_run import REFERENCE_ROWS, make_fake_run
 
 TOOL = Path(__file__).parents[2] / "tools" / "interval_coverage.py"
@@ -22,6 +23,7 @@ def _lines(text):
     return [[line for line in part.splitlines() if re.match(r"\| \d", line)] for part in text.split("|---|\n")[1:]]
 
 
+@pytest.mark.slow
 def test_worlds_are_simulated():
     for table in _tables("--trials", "60"):
         assert [line[0] for line in table] == [3, 5, 10, 20, 50, 120]

@@ -169,6 +169,7 @@ def test_rows_are_ordered_against_both_targets_without_those_who_are_told():
     assert order_sentence(measured, expected, same) == "The order of the 2 rows by mean class IoU stays the same."
 
 
+@pytest.mark.slow
 def test_files_have_the_shares_and_the_second_target(told_run, tmp_path):
     page = write_report(told_run, tmp_path / "report")
     summary = (
@@ -209,6 +210,7 @@ def told_run(tmp_path_factory):
     return folder / "run"
 
 
+@pytest.mark.slow
 def test_without_the_second_target_nothing_is_said_of_it(run, tmp_path):
     page = write_report(run, tmp_path / "report")
     text = page.read_text()

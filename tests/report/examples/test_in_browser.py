@@ -3,6 +3,8 @@
 import pytest
 from support.browser import open_page
 
+pytestmark = pytest.mark.slow
+
 OPEN_ALL = "document.querySelectorAll('details').forEach(part => { part.open = true; });"
 
 

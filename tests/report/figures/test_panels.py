@@ -14,6 +14,7 @@ def test_panels_stand_in_rows_of_five_at_most(count, grid):
     assert panel_grid(count) == grid
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [4, 17])
 def test_panels_of_many_categories_with_long_names_fit_on_a_page(count):
     titles = [f"Some quite long category name {number} (known)" for number in range(count)]

@@ -11,6 +11,8 @@ from support.browser import open_page
 
 from semgrid_eval.classes import DEFAULT_CLASSES, MASK_COLOUR
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def opened(browser, page):

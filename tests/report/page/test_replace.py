@@ -88,6 +88,7 @@ def test_a_foreign_file_under_the_name_of_one_of_the_reports_is_told(reported):
     assert (report / "index.html").is_file()
 
 
+@pytest.mark.slow
 def test_two_reports_at_once_both_succeed(reported):
     failed = []
 

@@ -152,6 +152,7 @@ def test_every_number_tells_what_stands_behind_it(page):
     assert len(without) < 40  # sizes and counts, which stand for themselves
 
 
+@pytest.mark.slow
 def test_the_same_run_gives_the_same_bytes_without_torch(run, page, tmp_path):
     code = """import sys
 from pathlib import Path
@@ -270,6 +271,7 @@ def test_several_runs_stand_in_one_verdict_where_targets_match(side_by_side):
         assert (side_by_side.parent / f"matrix-{number}.yaml").is_file()
 
 
+@pytest.mark.slow
 def test_a_row_by_another_name_is_said_and_not_listed_twice(reference_page):
     found = _read(reference_page)
     assert "ED-SL2 is ED-DC by another name: the same settings, so listed once." in found.text
@@ -297,6 +299,7 @@ def test_rows_on_another_grid_are_not_subtracted_and_the_page_says_why(tmp_path)
     assert read_json(page.parent / "report.json")["rows"]["ED-fine"]["reference"] is None
 
 
+@pytest.mark.slow
 def test_runs_with_different_windows_are_not_subtracted_and_the_page_says_why(tmp_path):
     runs = [
         make_fake_run(tmp_path / name, rows=(FakeRow("DC", "BL"), FakeRow("DC", "ED", 0.1, 1)), recordings=count)

@@ -90,6 +90,7 @@ def test_findings_and_regions_are_there_for_machines(page):
     assert line.difference == pytest.approx(ours["value"], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_level_of_resampling_is_told_with_its_reason(run, tmp_path):
     grouped = write_report(run, tmp_path / "report", resample="groups")
     interval = read_json(grouped.parent / "report.json")["interval"]

@@ -110,6 +110,7 @@ def test_sweeps_come_along_without_labels_and_everything_comes_back(log, tmp_pat
     assert (tmp_path / "again.mcap").read_bytes() == log.read_bytes()
 
 
+@pytest.mark.slow
 def test_grids_show_who_was_seen_and_who_moves(log):
     (recording,) = build_log(log, GridConfig(sensors={"tracks": TracksSensor()}, target=("tracks",)))
     car, person, road = (CLASS_NAMES.index(name) for name in ("car", "person", "road"))

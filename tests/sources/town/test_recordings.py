@@ -237,6 +237,7 @@ def test_absurd_wishes_are_refused_by_name(changes, message):
         parse_config(SyntheticConfig, {**SMALL, **changes})
 
 
+@pytest.mark.slow
 def test_validation_may_have_another_share_of_the_towns_than_of_the_recordings():
     config = SyntheticConfig(**{**SMALL, "towns": 3, "recordings": 8}, val_towns=1)
     plans = plan_recordings(config, town_cache(), silent)

@@ -34,6 +34,8 @@ from semgrid_eval.sources.town.stage import Scenery
 from semgrid_eval.sources.town.town import load_town
 from semgrid_eval.sources.town.varied import fixed_conditions
 
+pytestmark = pytest.mark.slow
+
 CAMERAS = ("front", *SIDES)
 STATIC = [CLASS_NAMES.index(name) for name in ("road", "sidewalk", "building", "vegetation", "pole_sign")]
 MOMENTS = 32  # in .6 s
