@@ -56,7 +56,7 @@ class RunData:
         self._folder = logs
         self._logs = find_logs(logs)
         self.cache, self._executor, self._stage = cache, executor, stage
-        self._storage = Storage(device, cache)
+        self._storage = Storage(device, cache, stage)
         self._configs = {grid_digest(row.grid): row.grid for row in rows}
         self._sensors = defaultdict[str, list[str]](list)
         for row in rows:

@@ -1,9 +1,14 @@
 """How much a command says: usually, with -q and with -v; and patterns in place of the names of logs."""
 
+import io
+import re
+
+import click
 import pytest
 from click.testing import CliRunner
 from support.cityscapes_tree import Tree
 
+from semgrid_eval.cli.console import progress
 from semgrid_eval.cli.main import COMMANDS, cli
 from semgrid_eval.sources.known import SOURCES
 
@@ -34,6 +39,27 @@ def test_quiet_leaves_errors_alone_and_verbose_names_every_piece_of_work(tree):
     for done, name in enumerate(("aachen", "berlin", "bonn"), start=1):
         assert f"convert: {done}/3 val/{name}_000000_000000" in verbose
     assert [line for line in usual if "/3" in line] != [line for line in verbose if "/3" in line]
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_what_a_stage_waits_for_has_a_bar_below_it(monkeypatch):
+    shown = Terminal()
+    monkeypatch.setattr("sys.stderr", shown)
+    monkeypatch.setenv("TERM", "xterm")
+    with click.Context(cli), progress("score a") as outer:
+        outer(1, 2, "first")
+        with progress("gather") as inner:
+            inner(3, 3, "last")
+        outer(2, 2)
+    lines = re.split(r"[\r\n]+", re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.getvalue()))
+    score, gather = [line for line in lines if line.strip()][-2:]
+    assert re.search(r"score a .* 2/2", score)
+    assert re.search(r"gather .* 3/3 .* last", gather)
+    assert shown.getvalue().count("\x1b[?25l") == 1, "one display hides the cursor"
 
 
 def test_warnings_are_said_with_quiet(tree):
