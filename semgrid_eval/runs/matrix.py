@@ -15,7 +15,7 @@ from semgrid_eval.class_files import with_classes
 from semgrid_eval.config import Config, load_yaml, merged, parse_config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.faults import meant, not_one_of, shown
-from semgrid_eval.models.beside import require_python
+from semgrid_eval.models.beside import require_defined, require_python
 from semgrid_eval.models.registry import is_named, model_names
 from semgrid_eval.runs.row import Row
 
@@ -82,6 +82,7 @@ def _require_model(name: str) -> None:
             require_python(Path(file))
             if not cls.isidentifier():
                 raise ConfigError(f"{cls!r} is not the name of a class; a model is given as path.py:Class", path=file)
+            require_defined(Path(file), cls)
         elif name not in (known := model_names()):
             raise ConfigError(f"{not_one_of(name, [*known, 'path.py:Class'])}")
     except InputError as error:
