@@ -196,7 +196,16 @@ def _expanded(file: _MatrixFile, path: Path) -> Iterator[tuple[str, dict[str, An
             raise ConfigError(f"give {number} rows, and {ROW_LIMIT} are allowed", path=path, field="axes")
         for values in _combinations(axes, f"{path}: {place}"):
             filled = _fill(whole, values, f"{path}: {place}")
+            _refuse_class_file(filled, f"{path}: {place}")
             yield place, _with_bases(filled, file.models)
+
+
+def _refuse_class_file(row: dict[str, Any], place: str) -> None:
+    """Refuse the file of a class set that an axis names; all others are read by now."""
+    grid = row.get("grid")
+    if isinstance(grid, dict) and isinstance(name := grid.get("classes"), str):
+        fault = f"{name!r} comes from an axis, and all rows of a matrix have the same classes: name it under defaults"
+        raise ConfigError(fault, path=place, field="grid.classes")
 
 
 def _with_bases(row: dict[str, Any], models: dict[str, dict[str, Any]]) -> dict[str, Any]:
@@ -224,6 +233,7 @@ def _combinations(axes: _Axes, place: str) -> Iterator[dict[str, Any]]:
 
 def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, Any]:
     for key, value in values.items():
+        _require_settable(row, key, place)
         nested: Any = value
         for part in reversed(key.split(".")):
             nested = {part: nested}
@@ -236,3 +246,18 @@ def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, 
     if "{" in name:
         raise ConfigError(f"{name!r} has a place that no axis fills", path=place, field="name")
     return row | {"name": name}
+
+
+def _require_settable(row: dict[str, Any], key: str, place: str) -> None:
+    """Make sure that an axis, a dotted name, can be set in a row: all above it are mappings, or not there."""
+    *above, last = key.split(".")
+    if not all((*above, last)):
+        raise ConfigError(f"{key!r} is not a dotted name of a setting", path=place, field="axes")
+    found: Any = row
+    for number, part in enumerate(above, start=1):
+        found = found.get(part, {})
+        if found is None:  # not set
+            return
+        if not isinstance(found, dict):
+            fault = f"must be a mapping of keys to values, as the axis {key} sets one, not {shown(found)}"
+            raise ConfigError(fault, path=place, field=".".join(above[:number]))
