@@ -1,6 +1,6 @@
 """What a grid is and how it is made: extent, sensors and the choices that the paper leaves (readings 12 to 22)."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,9 +130,14 @@ class GridConfig(Config):
         """Of what is counted for each class in each cell: (C, rows, columns)."""
         return self.classes.count, self.spec.rows, self.spec.columns
 
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the grids, as JSON values; the default classes, in any colours, are not written."""
+        settings = self.model_dump(mode="json", exclude={"classes"})
+        return settings if self.classes.means(DEFAULT_CLASSES) else {**settings, "classes": self.classes.identity()}
+
     def target_identity(self) -> dict[str, object]:
         """Return what determines the targets alone, whatever other sensors there are and what any is called."""
-        settings = self.model_dump(mode="json")
+        settings = self.identity()
         sensors = [settings["sensors"][name] for name in self.target]
         return {**settings, "sensors": sensors, "target": len(sensors)}
 

@@ -42,10 +42,10 @@ class Given:
         return self.grids * self.classes.count
 
     def described(self) -> dict[str, object]:
-        """Return all of it as JSON values, for digests; the default classes are left out."""
+        """Return what determines a model as JSON values, for digests; the default classes are left out."""
         told = {key: value for key, value in vars(self).items() if key != "classes"}
-        is_default = self.classes == DEFAULT_CLASSES
-        return told if is_default else {**told, "classes": self.classes.model_dump(mode="json")}
+        is_default = self.classes.means(DEFAULT_CLASSES)
+        return told if is_default else {**told, "classes": self.classes.identity()}
 
 
 class AnswersIn(NamedTuple):

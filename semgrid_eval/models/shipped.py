@@ -45,7 +45,7 @@ class TownResidual(Model, torch.nn.Module):
         if given.grids != _INPUTS or given.inputs != _INPUTS:
             asked = f"{len(given.sensors)} sensors and {given.inputs} inputs"
             raise ConfigError(f"was trained on {_INPUTS} inputs of one sensor, not {asked}", field="model")
-        if given.classes != DEFAULT_CLASSES:
+        if not given.classes.means(DEFAULT_CLASSES):
             names = ", ".join(given.classes.names)
             raise ConfigError(f"was trained on the default classes, and grid.classes has {names}", field="model")
         if not given.translate:

@@ -151,5 +151,5 @@ class RunData:
 
 
 def grid_digest(config: GridConfig) -> str:
-    """Digest a grid configuration."""
-    return digest_value(config.model_dump(mode="json"))
+    """Digest what determines the grids of a configuration."""
+    return digest_value(config.identity())

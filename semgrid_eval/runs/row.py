@@ -161,12 +161,13 @@ class Row(Config):
         return _found(self.model)
 
     def identity(self) -> dict[str, object]:
-        """Return what determines the row's numbers, besides code and logs: all but its name and repeats.
+        """Return what determines the row's numbers, besides code and logs: all but its name, repeats and colours.
 
         A second target that is not asked for changes no id.
         """
         unset = {"second_target"} if self.second_target is None else set()
-        return self.model_dump(mode="json", exclude={"name", "repeats", *unset})
+        written = self.model_dump(mode="json", exclude={"name", "repeats", "grid", *unset})
+        return {**written, "grid": self.grid.identity()}
 
     @property
     def asked(self) -> Truth | None:

@@ -170,7 +170,7 @@ def test_a_class_set_is_found_beside_the_file_that_names_it(tmp_path):
     rows = load_matrix(str(tmp_path / "m.yaml")).rows
     assert [row.grid.classes.names[1] for row in rows] == ["drivable", "drivable"]
     assert rows[0].given.classes == rows[1].grid.classes
-    assert rows[0].identity()["grid"]["classes"] == rows[0].grid.classes.model_dump(mode="json")
+    assert rows[0].identity()["grid"]["classes"] == rows[0].grid.classes.identity()
 
 
 def test_rows_of_a_matrix_have_one_class_set(tmp_path):
