@@ -86,7 +86,7 @@ def _require_model(name: str) -> None:
         elif name not in (known := model_names()):
             raise ConfigError(f"{not_one_of(name, [*known, 'path.py:Class'])}")
     except InputError as error:
-        raise ConfigError(str(error), field="--model") from None
+        raise ConfigError(str(error), field="model") from None
 
 
 def _read(name: str, *above: Path) -> tuple[_MatrixFile, Path]:

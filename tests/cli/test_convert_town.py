@@ -167,10 +167,10 @@ def test_how_many_recordings_must_be_said(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        (["--width", "1000000"], "Error: width: "),
+        (["--width", "1000000"], "Error: --width: "),
         (["--towns", "1"], "Error: training and validation need different towns"),
-        (["--duration-s", "0"], "Error: duration_s: "),
-        (["--val-towns", "0"], "Error: val_towns: "),
+        (["--duration-s", "0"], "Error: --duration-s: "),
+        (["--val-towns", "0"], "Error: --val-towns: "),
     ],
 )
 def test_an_impossible_wish_is_one_line(option, message, tmp_path, capsys):

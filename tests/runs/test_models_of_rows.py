@@ -36,7 +36,7 @@ def test_models_of_ones_own_are_rows_with_the_matrix_s_defaults(tmp_path, monkey
 )
 def test_a_class_that_a_file_cannot_have_is_told_at_once(tmp_path, code, fault):
     (tmp_path / "mine.py").write_text(code)
-    with pytest.raises(ConfigError, match=rf"^--model: .*{fault}"):
+    with pytest.raises(ConfigError, match=rf"^model: .*{fault}"):
         load_matrix("smoke", models=[f"{tmp_path}/mine.py:Nope"])
 
 
