@@ -74,7 +74,7 @@ class GridConfig(Config):
     # The classes of cells, as docs/classes.md says; in a file also the path of one, relative to it. The default is not
     # written, so that grids of it keep their digests.
     classes: ClassSet = Field(DEFAULT_CLASSES, exclude_if=lambda classes: classes == DEFAULT_CLASSES)
-    stretch_frames: int = Field(30, ge=2, le=100_000)  # length of a recording; longer logs are cut (reading 18)
+    stretch_frames: int = Field(30, ge=2, le=100_000)  # longer recordings are cut into stretches (reading 18)
     # Grid class, or none, by Cityscapes label name; replaces single labels of `classes` (reading 21).
     class_map: dict[str, str | None] = Field(default_factory=dict)
 
