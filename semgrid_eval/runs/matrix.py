@@ -18,6 +18,7 @@ from semgrid_eval.faults import meant, not_one_of, shown
 from semgrid_eval.models.beside import require_defined, require_python
 from semgrid_eval.models.registry import is_named, model_names
 from semgrid_eval.runs.row import Row
+from semgrid_eval.words import plural
 
 ROW_LIMIT = 10_000
 MAX_SEED = 1 << 53  # whoever reads JSON has whole numbers up to here
@@ -193,7 +194,7 @@ def _expanded(file: _MatrixFile, path: Path) -> Iterator[tuple[str, dict[str, An
         axes = parse_config(_WithAxes, {"axes": whole.pop("axes", {})}, path=f"{path}: {place}").axes
         number += math.prod(len(values) for values in axes.grid.values()) * max(map(len, axes.zip.values()), default=1)
         if number > ROW_LIMIT:
-            raise ConfigError(f"give {number} rows, and {ROW_LIMIT} are allowed", path=path, field="axes")
+            raise ConfigError(f"give {plural(number, 'row')}, and {ROW_LIMIT:,} are allowed", path=path, field="axes")
         for values in _combinations(axes, f"{path}: {place}"):
             filled = _fill(whole, values, f"{path}: {place}")
             _refuse_class_file(filled, f"{path}: {place}")

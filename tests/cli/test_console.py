@@ -67,7 +67,7 @@ def test_warnings_are_said_with_quiet(tree):
     tree.write(range(2))
     (tree.root.parent / "logs" / "val" / "bonn_000000_000000.mcap").rename(tree.root.parent / "logs/val/other.mcap")
     (warning,) = said("convert", "cityscapes", "tree", "logs", "--quiet")
-    assert warning.startswith("Warning: logs holds 1 logs that do not belong")
+    assert warning.startswith("Warning: logs holds 1 log beside those of this conversion")
 
 
 def test_quiet_and_verbose_exclude_each_other(tree):
@@ -103,4 +103,4 @@ def test_a_log_whose_name_has_signs_of_a_pattern_is_itself(tree):
     said("convert", "cityscapes", "tree", "logs")
     log = tree.root.parent / "logs/val/bonn_000000_000000.mcap"
     log.rename(log.with_name("b[1].mcap"))
-    assert said("check", "logs/val/b[1].mcap")[-1] == "1 logs checked, 0 with errors"
+    assert said("check", "logs/val/b[1].mcap")[-1] == "1 log checked, 0 with errors"

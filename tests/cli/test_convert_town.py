@@ -82,7 +82,7 @@ def test_the_example_writes_logs_and_a_second_run_keeps_them_and_warns_of_others
     again = CliRunner().invoke(cli, arguments)
     assert again.output.endswith(
         "logs: 0 written, 2 up to date, 0 failed\n"
-        "Warning: logs holds 1 logs that do not belong to this conversion, such as logs/val/another.mcap\n"
+        "Warning: logs holds 1 log beside those of this conversion, such as logs/val/another.mcap\n"
     )
     assert [log.stat().st_mtime_ns for log in logs] == before
 
@@ -138,7 +138,7 @@ def test_logs_that_do_not_belong_are_a_warning(rendered, define, tmp_path, capsy
     shutil.copy(out / f"{LABELS[0]}.mcap", stray)
     code, lines = run(capsys, *benchmark_options(tmp_path, 1))
     assert code == 0
-    assert f"Warning: {tmp_path} holds 1 logs that do not belong to this conversion, such as {stray}" in lines
+    assert f"Warning: {tmp_path} holds 1 log beside those of this conversion, such as {stray}" in lines
 
 
 def test_the_benchmark_of_rigs_has_their_sensors(tmp_path, monkeypatch):

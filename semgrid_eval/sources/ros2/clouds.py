@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from semgrid_eval.errors import InputError
 from semgrid_eval.recording.lidar import MAX_POINTS
 from semgrid_eval.sources.ros2.mapping import LidarMap
+from semgrid_eval.words import plural
 
 PLACE = ("x", "y", "z")
 INTENSITY = "intensity"
@@ -124,7 +125,9 @@ def _require_size(message: Any) -> None:  # noqa: ANN401
         raise InputError(f"has points of {message.point_step} bytes; at most {MAX_POINT_BYTES} are allowed")
     row_bytes = message.width * message.point_step
     if message.row_step < row_bytes:
-        raise InputError(f"row_step {message.row_step} is less than {message.width} points of {message.point_step}")
+        raise InputError(
+            f"row_step {message.row_step} is less than {plural(message.width, 'point')} of {message.point_step}"
+        )
     if len(message.data) != message.row_step * message.height:
-        told = f"{message.height} rows of {message.row_step}"
-        raise InputError(f"has {len(message.data)} bytes, which are not {told}")
+        told = f"{plural(message.height, 'row')} of {message.row_step}"
+        raise InputError(f"has {plural(len(message.data), 'byte')}, which are not {told}")

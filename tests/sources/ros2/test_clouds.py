@@ -64,7 +64,7 @@ FAULTS = {
     "beyond": (renamed(WHOLE, "z", offset=17), "z begins at byte 17 and reaches beyond a point of 20 bytes"),
     "short rows": (replace(WHOLE, row_step=59), "row_step 59 is less than 3 points of 20"),
     "cut": (replace(WHOLE, data=WHOLE.data[:-1]), "has 119 bytes, which are not 2 rows of 60"),
-    "long": (replace(WHOLE, height=1), "has 120 bytes, which are not 1 rows of 60"),
+    "long": (replace(WHOLE, height=1), "has 120 bytes, which are not 1 row of 60"),
     "huge": (replace(WHOLE, width=2**31), "has 2147483648 x 2 points; at most 4194304 are allowed"),
     "wide": (replace(WHOLE, point_step=2**31), "has points of 2147483648 bytes; at most 1024 are allowed"),
 }

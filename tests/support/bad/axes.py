@@ -18,7 +18,7 @@ name: "a{window.inputs}", window: 2, axes: {grid: {window.inputs: [2, 3]}}
 name: "a{window.inputs}", axes: {zip: {window: [3], window.inputs: [2]}}
 name: "a{grid.classes}", axes: {grid: {grid.classes: [mine.yaml, yours.yaml]}}
 name: "a{grid.classes}", axes: {grid: {grid.classes: [3]}}
-name: "a{grid}", axes: {grid: {grid: [{classes: mine.yaml}]}}
+name: a, axes: {grid: {grid: [{classes: mine.yaml}]}}
 """
 
 _MANY = ", ".join(f"settings.x{each}: [{', '.join(map(str, range(22)))}]" for each in range(3))
