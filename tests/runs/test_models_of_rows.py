@@ -11,6 +11,7 @@ from semgrid_eval.models.registry import ENTRY_POINT_GROUP
 from semgrid_eval.runs.matrix import load_matrix
 
 
+@pytest.mark.slow
 def test_models_of_ones_own_are_rows_with_the_matrix_s_defaults(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "lib").mkdir()
@@ -49,6 +50,7 @@ def test_a_class_that_a_file_may_make_is_left_to_its_row(tmp_path, code):
     assert load_matrix("smoke", models=[f"{tmp_path}/mine.py:Nope"]).rows[-1].name == "Nope"
 
 
+@pytest.mark.slow
 def test_an_installed_model_is_a_row_and_is_looked_for_only_where_one_is_asked_for(tmp_path, monkeypatch):
     looked_for = []
 
@@ -102,6 +104,7 @@ class Own(Network):
 """
 
 
+@pytest.mark.slow
 def test_settings_of_ones_own_network_are_axes_and_checked_where_its_code_can_be_loaded(tmp_path):
     (tmp_path / "own.py").write_text(OWN)
     model = f"{tmp_path}/own.py:Own"
