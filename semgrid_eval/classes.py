@@ -115,6 +115,14 @@ class ClassSet(Config):
     def _label_ids(self) -> list[list[int]]:
         return [[LABEL_ID[each] if isinstance(each, str) else each for each in entry.labels] for entry in self.classes]
 
+    def identity(self) -> dict[str, object]:
+        """Return what determines grids and scores, as JSON values: all but the colours in which classes are shown."""
+        return self.model_dump(mode="json", exclude={"classes": {"__all__": {"colour", "safe_colour"}}})
+
+    def means(self, other: "ClassSet") -> bool:
+        """Tell whether another set differs from this one in colours at most."""
+        return self == other or self.identity() == other.identity()
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names by id."""

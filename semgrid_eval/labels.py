@@ -9,10 +9,13 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+NO_TRAIN_ID = 255
+"""The train id of labels that nothing is trained on."""
+
 
 @dataclass(frozen=True)
 class CityscapesLabel:
-    """A label of the Cityscapes label set: its id, train id (255 where it has none) and colour."""
+    """A label of the Cityscapes label set: its id, train id (`NO_TRAIN_ID` where it has none) and colour."""
 
     name: str
     label_id: int
@@ -29,13 +32,15 @@ def _read_labels() -> Iterator[CityscapesLabel]:
 
 CITYSCAPES_LABELS = tuple(_read_labels())
 LABEL_ID = {label.name: label.label_id for label in CITYSCAPES_LABELS}
+LAST_LABEL_ID = max(LABEL_ID.values())
+LAST_TRAIN_ID = max(label.train_id for label in CITYSCAPES_LABELS if label.train_id != NO_TRAIN_ID)
 
 
 def label_ids_from_train_ids() -> NDArray[np.uint8]:
     """Return the table (256,) from Cityscapes train id to label id; what is not a train id becomes 0 (unlabeled)."""
     table = np.zeros(256, np.uint8)
     for label in CITYSCAPES_LABELS:
-        if label.train_id != 255:
+        if label.train_id != NO_TRAIN_ID:
             table[label.train_id] = label.label_id
     return table
 

@@ -124,8 +124,13 @@ def tables(found: dict[str, Any]) -> Iterator[str]:
         yield "\n| matrix | trainings | 2 cores | 16 cores | 10 machines of 2 cores | one H100 |"
         yield "|---|---|---|---|---|---|"
         for name, each in hours(found).items():
-            told = [f"{each[where]:.3g} h" for where in ("2 cores", "16 cores", "20 cores", "GPU")]
+            told = [in_hours(each[where]) for where in ("2 cores", "16 cores", "20 cores", "GPU")]
             yield f"| `{name}` | {each['trainings']} | {' | '.join(told)} |"
+
+
+def in_hours(hours: float) -> str:
+    """Write hours with three digits, whole ones beyond that."""
+    return f"{hours:,.0f} h" if hours >= 100 else f"{hours:.3g} h"
 
 
 def in_words(power: float) -> str:

@@ -25,6 +25,7 @@ from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sensors.projection import Projection
 from semgrid_eval.sensors.sensor import Points
 from semgrid_eval.sources.town.config import FRAME_COUNT
+from semgrid_eval.words import plural
 
 SCORED_WINDOWS = 500
 
@@ -36,13 +37,18 @@ def measure_grids(material: Material) -> Iterator[Measurement]:
     for config in (whole, GridConfig()):
         make = partial(build_log, material.log, config)
         make()  # compiles
-        what = f"grids of {len(config.sensors)} sensor{'s' * (len(config.sensors) > 1)}"
+        what = f"grids of {plural(len(config.sensors), 'sensor')}"
         yield Measurement(what, FRAME_COUNT / wall_s(make, settings.repeats), "frames/s")
         taken = 1.0 / times_as_fast(make, decode, settings.repeats)
         yield Measurement(f"{what}, against decoding by OpenCV", taken, "times its time")
     alone, together = (partial(_build_anew, material, workers) for workers in (1, settings.workers))
     gain = times_as_fast(together, alone, settings.repeats, clock=seconds_passed)
-    yield Measurement(f"grids of {settings.recordings} logs, {settings.workers} workers", gain, "times", at_least=1.8)
+    yield Measurement(
+        f"grids of {plural(settings.recordings, 'log')}, {plural(settings.workers, 'worker')}",
+        gain,
+        "times",
+        at_least=1.8,
+    )
 
 
 def measure_cells(material: Material) -> Iterator[Measurement]:
@@ -80,7 +86,7 @@ def measure_scoring(settings: Settings) -> Iterator[Measurement]:
     if not np.array_equal(ours(), rival()):
         raise AssertionError("Cityscapes' way finds other counts")
     gain = times_as_fast(ours, rival, settings.repeats)
-    yield Measurement(f"{count} windows counted, against Cityscapes' way", gain, "times", at_least=3.0)
+    yield Measurement(f"{plural(count, 'window')} counted, against Cityscapes' way", gain, "times", at_least=3.0)
 
 
 def _build_anew(material: Material, workers: int) -> None:

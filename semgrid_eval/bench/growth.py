@@ -27,6 +27,7 @@ from semgrid_eval.scores.evaluate import evaluate
 from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import WindowConfig, training_windows
+from semgrid_eval.words import plural
 
 CPU = torch.device("cpu")
 EXTENT_M = 100.0
@@ -149,7 +150,7 @@ def measured(logs: Sequence[Path], size: Size) -> Iterator[dict[str, Any]]:
     """Measure all stages at all points: a record each."""
     needed = max(size.axes["recordings"])
     if len(logs) < needed:
-        raise InputError(f"holds {len(logs)} logs, and {needed} are needed", field="logs")
+        raise InputError(f"holds {plural(len(logs), 'log')}, and {needed} are needed", field="logs")
     with tempfile.TemporaryDirectory() as name:
         for work in Stages(Point(recordings=1), logs, Path(name, "warm"), size).work.values():
             work()  # compiles

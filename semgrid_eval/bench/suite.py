@@ -42,7 +42,7 @@ def measure(
     """
     unknown = [part for part in parts if part not in PARTS]
     if unknown:
-        raise ConfigError(not_one_of(unknown[0], PARTS), field="part")
+        raise ConfigError(not_one_of(unknown[0], PARTS), field="only")
     chosen = [part for part in PARTS if part in parts]
     found: dict[str, list[Measurement]] = {}
     with tempfile.TemporaryDirectory(prefix="semgrid-bench-") as folder:

@@ -10,6 +10,7 @@ import click
 from semgrid_eval.cli.console import loudness_options, progress, say
 from semgrid_eval.cli.options import FILE_THERE, FOLDER, logs_argument
 from semgrid_eval.errors import printable
+from semgrid_eval.words import plural
 
 if TYPE_CHECKING:
     from semgrid_eval.log.findings import LogReport
@@ -96,16 +97,18 @@ def _show(reports: "Sequence[LogReport]", outcomes: "Sequence[Outcome]") -> None
         for finding in report.findings:
             click.echo(printable(f"{report.path}: {finding}"))
         if report.more:
-            click.echo(printable(f"{report.path}: and {report.more} more findings"))
+            click.echo(printable(f"{report.path}: and {plural(report.more, 'more finding')}"))
 
 
 def _judge(reports: "Sequence[LogReport]", outcomes: "Sequence[Outcome]", *, strict: bool) -> int:
     bad = sum(not report.good or (strict and bool(report.findings)) for report in reports)
-    say(f"{len(reports)} logs checked, {bad} with errors{' or warnings' if strict else ''}")
+    say(f"{plural(len(reports), 'log')} checked, {bad} with errors{' or warnings' if strict else ''}")
     unsaved = sum(each.recovery is None for each in outcomes)
     lossy = sum(each.recovery is not None and not each.recovery.lost_nothing for each in outcomes)
     if outcomes:
-        say(f"{len(outcomes) - unsaved} logs saved, {lossy} of them with losses; {unsaved} could not be saved")
+        say(
+            f"{plural(len(outcomes) - unsaved, 'log')} saved, {lossy} of them with losses; {unsaved} could not be saved"
+        )
     if unsaved or not all(report.is_readable for report in reports):
         return _UNREADABLE
     return 1 if bad or lossy else 0

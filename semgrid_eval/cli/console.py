@@ -9,16 +9,19 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from semgrid_eval.errors import printable
 from semgrid_eval.progress import Progress, silent
 
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bars
+
 PLAIN_LINE_INTERVAL_S = 10.0
 Command = TypeVar("Command", bound=Callable[..., Any])
-_LOUDNESS = f"{__name__}.loudness"
+_LOUDNESS, _BARS = f"{__name__}.loudness", f"{__name__}.bars"
 
 
 def loudness_options(command: Command) -> Command:
@@ -70,6 +73,32 @@ def progress(label: str) -> Iterator[Progress]:
 
 
 def _bar(label: str) -> Iterator[Progress]:
+    with _bars() as bars:
+        task = bars.add_task(label, total=None, message="")
+
+        def update(done: int, total: int, message: str = "") -> None:
+            bars.update(task, completed=done, total=total, message=printable(message))
+
+        yield update
+
+
+@contextmanager
+def _bars() -> Iterator["Bars"]:
+    """Show bars, below those that are shown already: what one piece of work waits for may have its own."""
+    ctx = click.get_current_context(silent=True)
+    meta = {} if ctx is None else ctx.meta
+    if _BARS in meta:
+        yield meta[_BARS]
+        return
+    with _new_bars() as bars:
+        meta[_BARS] = bars
+        try:
+            yield bars
+        finally:
+            del meta[_BARS]
+
+
+def _new_bars() -> "Bars":
     from rich import progress as rich  # not needed for any --help
     from rich.console import Console
 
@@ -78,13 +107,7 @@ def _bar(label: str) -> Iterator[Progress]:
         *(rich.TimeElapsedColumn(), rich.TimeRemainingColumn()),
         rich.TextColumn("{task.fields[message]}", markup=False),
     )
-    with rich.Progress(*columns, console=Console(stderr=True)) as bars:
-        task = bars.add_task(label, total=None, message="")
-
-        def update(done: int, total: int, message: str = "") -> None:
-            bars.update(task, completed=done, total=total, message=printable(message))
-
-        yield update
+    return rich.Progress(*columns, console=Console(stderr=True))
 
 
 class _PlainLines:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from semgrid_eval.cli.console import complain, say
 from semgrid_eval.errors import InputError
+from semgrid_eval.words import plural
 
 if TYPE_CHECKING:
     from semgrid_eval.log.convert import ConversionSummary
@@ -17,7 +18,9 @@ def show(summary: "ConversionSummary", out: Path) -> int:
     say(f"{out}: {len(summary.written)} written, {len(summary.skipped)} up to date, {len(summary.failed)} failed")
     others = _strays(out, summary)
     if others:
-        complain(f"Warning: {out} holds {len(others)} logs that do not belong to this conversion, such as {others[0]}")
+        complain(
+            f"Warning: {out} holds {plural(len(others), 'log')} beside those of this conversion, such as {others[0]}"
+        )
     if summary.remark and (summary.written or summary.skipped):  # it is about logs that there are
         (complain if summary.remark.startswith("Warning") else say)(summary.remark)
     return 1 if summary.failed else 0

@@ -6,6 +6,7 @@ import click
 
 from semgrid_eval.cli.console import complain, loudness_options, progress, say
 from semgrid_eval.cli.options import FOLDER, THERE, Folders, chosen_executor, executor_options, workers_option
+from semgrid_eval.words import plural
 
 
 def _print_classes(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -50,5 +51,6 @@ def command(logs: Path, out: Path, config: Path | None, workers: int, executor: 
         data = build_grids(find_logs(logs), out, grid_config, executor=work_on, progress=watch)
     for reason in data.failed.values():
         complain(f"Error: {reason}")
-    say(f"{len(data.recordings)} recordings in {out}: {data.built} logs built, {data.reused} re-used")
+    built = f"{plural(data.built, 'log')} built, {data.reused} re-used"
+    say(f"{plural(len(data.recordings), 'recording')} in {out}: {built}")
     return 1 if data.failed else 0

@@ -5,10 +5,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from semgrid_eval.errors import InputError
+
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 Table = Callable[[], Mapping[str, str]]
+_INVOKED = f"{__name__}.invoked"
+
+
+def option_of(error: InputError, ctx: click.Context) -> str | None:
+    """Return the option of the command that was invoked, as it is typed, that an error of no file is of, if it is."""
+    option, command = f"--{(error.field or '').replace('_', '-')}", ctx.meta.get(_INVOKED)
+    is_option = command is not None and any(option in each.opts for each in command.params)
+    return option if error.path is None and is_option else None
 
 
 class TableGroup(click.Group):
@@ -41,7 +51,9 @@ class TableGroup(click.Group):
             from semgrid_eval.faults import not_one_of  # which needs yaml
 
             ctx.fail(f"command {not_one_of(name, self._table())}")
-        return super().resolve_command(ctx, args)
+        found = super().resolve_command(ctx, args)
+        ctx.meta[_INVOKED] = found[1]
+        return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the table as the section of commands."""

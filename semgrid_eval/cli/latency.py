@@ -12,6 +12,7 @@ from semgrid_eval.cli.options import FILE_THERE, FOLDER, device_option, logs_arg
 from semgrid_eval.cli.types import Whole
 from semgrid_eval.config import parse_config
 from semgrid_eval.segmentation.config import SegmentationConfig
+from semgrid_eval.words import plural
 
 if TYPE_CHECKING:
     from semgrid_eval.streams.profile import LatencyProfile
@@ -69,7 +70,7 @@ def command(logs: tuple[Path, ...], out: Path, frames: int, warm_up: int, **give
         click.echo(line)
     for name in built.random:
         say(f"{name} has random weights: it takes as long as if it were trained")
-    say(f"{out}: {profile.frames} frames")
+    say(f"{out}: {plural(profile.frames, 'frame')}")
 
 
 class _Row(NamedTuple):

@@ -13,8 +13,8 @@ from typing import Any, NoReturn
 import click
 
 from semgrid_eval import __version__
-from semgrid_eval.cli.groups import TableGroup
-from semgrid_eval.errors import SemgridError, printable
+from semgrid_eval.cli.groups import TableGroup, option_of
+from semgrid_eval.errors import InputError, SemgridError, printable
 
 COMMANDS = {
     "demo": "All of the below on a simulated town, in some minutes.",
@@ -41,7 +41,7 @@ def _load(name: str) -> click.Command:
 
 
 class _Commands(TableGroup):
-    """All commands; one that is stopped says whether it goes on from there."""
+    """All commands; one that is stopped says whether it goes on from there, and of an option how it is typed."""
 
     def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 - whatever a command returns
         try:
@@ -49,6 +49,10 @@ class _Commands(TableGroup):
         except KeyboardInterrupt as error:
             what_next = "; the same command continues from here" if ctx.invoked_subcommand in _GO_ON else ""
             raise click.Abort(what_next) from error
+        except InputError as error:
+            if option := option_of(error, ctx):
+                raise InputError(str(error).removeprefix(f"{error.field}: "), field=option) from error
+            raise
 
 
 @click.group(

@@ -20,6 +20,7 @@ from semgrid_eval.cli.options import (
 )
 from semgrid_eval.cli.types import Number, Whole
 from semgrid_eval.errors import printable
+from semgrid_eval.words import plural
 from semgrid_eval.workplace import LOCAL
 
 if TYPE_CHECKING:  # torch takes seconds to import, and --help should not
@@ -149,5 +150,5 @@ def _show_plan(matrix: "Matrix", logs: Path, out: Path, options: "RunOptions") -
         click.echo("\t".join(printable(str(cell)) for cell in cells))
     at_once = options.executor.parallel
     minutes = sum(unit.seconds for unit in units) / 60 / at_once
-    say(f"About {minutes:.0f} minutes on this machine, {at_once} at a time.")
+    say(f"About {plural(round(minutes), 'minute')} on this machine, {at_once} at a time.")
     return 1 if any(unit.failure for unit in units) else 0

@@ -216,7 +216,7 @@ def _kept(log: Path, folder: Path, config: GridConfig) -> _Kept:
 def grid_key(log_digest: str, config: GridConfig) -> str:
     """Digest all that decides the grids of a log, and how they are kept."""
     versions = [FORMAT_VERSION, LAYOUT_VERSION]
-    return digest_value({"log": log_digest, "config": config.model_dump(mode="json"), "format": versions})
+    return digest_value({"log": log_digest, "config": config.identity(), "format": versions})
 
 
 def grid_file(log: str, key: str) -> str:

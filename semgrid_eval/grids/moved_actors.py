@@ -49,7 +49,7 @@ class MovedActors:
 
     def described(self, config: GridConfig) -> list[Any]:
         """Return all that decides the layers, as `Truth` says."""
-        return [self.sensors, config.model_dump(mode="json")]
+        return [self.sensors, config.identity()]
 
     def needed(self, times: WindowTimes) -> WindowTimes:
         """Keep all times."""

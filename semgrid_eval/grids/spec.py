@@ -1,6 +1,6 @@
 """What a grid is and how it is made: extent, sensors and the choices that the paper leaves (readings 12 to 22)."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +74,7 @@ class GridConfig(Config):
     # The classes of cells, as docs/classes.md says; in a file also the path of one, relative to it. The default is not
     # written, so that grids of it keep their digests.
     classes: ClassSet = Field(DEFAULT_CLASSES, exclude_if=lambda classes: classes == DEFAULT_CLASSES)
-    stretch_frames: int = Field(30, ge=2, le=100_000)  # length of a recording; longer logs are cut (reading 18)
+    stretch_frames: int = Field(30, ge=2, le=100_000)  # longer recordings are cut into stretches (reading 18)
     # Grid class, or none, by Cityscapes label name; replaces single labels of `classes` (reading 21).
     class_map: dict[str, str | None] = Field(default_factory=dict)
 
@@ -130,9 +130,14 @@ class GridConfig(Config):
         """Of what is counted for each class in each cell: (C, rows, columns)."""
         return self.classes.count, self.spec.rows, self.spec.columns
 
+    def identity(self) -> dict[str, Any]:
+        """Return what determines the grids, as JSON values; the default classes, in any colours, are not written."""
+        settings = self.model_dump(mode="json", exclude={"classes"})
+        return settings if self.classes.means(DEFAULT_CLASSES) else {**settings, "classes": self.classes.identity()}
+
     def target_identity(self) -> dict[str, object]:
         """Return what determines the targets alone, whatever other sensors there are and what any is called."""
-        settings = self.model_dump(mode="json")
+        settings = self.identity()
         sensors = [settings["sensors"][name] for name in self.target]
         return {**settings, "sensors": sensors, "target": len(sensors)}
 

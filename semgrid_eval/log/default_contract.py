@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from semgrid_eval.labels import CITYSCAPES_LABELS
+from semgrid_eval.labels import LAST_TRAIN_ID
 from semgrid_eval.log import topics
 from semgrid_eval.log.contract import CAMERA, Contract, Latency, Range, RangeBeside, TopicContract
 from semgrid_eval.log.findings import Severity
@@ -40,7 +40,6 @@ _MOUNTING = {
     "roll_rad": Range(low=-0.5, high=0.5),
     "pitch_rad": Range(low=-0.5, high=0.5),
 }
-_LAST_TRAIN_ID = max(label.train_id for label in CITYSCAPES_LABELS if label.train_id != 255)
 
 
 @cache
@@ -51,7 +50,7 @@ def default_contract() -> Contract:
     return Contract(
         checksums=Severity.WARNING,
         sensors=_NEEDED,
-        largest_label_id=Range(low=_LAST_TRAIN_ID + 1),
+        largest_label_id=Range(low=LAST_TRAIN_ID + 1),
         topics={
             topics.EGO_MOTION: _STEADY.model_copy(update=motion),
             _DISPARITY: _STEADY.model_copy(update=disparity),

@@ -19,6 +19,7 @@ from semgrid_eval.log.grids import GridLayer, GridPlace, class_layer, exact_mess
 from semgrid_eval.log.schemas.semantic_grid_pb2 import SemanticGrid
 from semgrid_eval.log.topics import GRID_PREDICTION
 from semgrid_eval.log.writer import MessageWriter
+from semgrid_eval.words import plural
 
 RECORDING = "recording"
 """The entry of its metadata record that names the recording which the predictions belong to."""
@@ -184,7 +185,9 @@ def _fault_of_names(names: tuple[str, ...], scored: tuple[str, ...]) -> str | No
     for number, (name, known) in enumerate(zip(names, scored, strict=False)):
         if name != known:
             return f"class {number} is {name!r}, and {known!r} is scored"
-    return None if len(names) == len(scored) else f"{len(names)} classes, and {len(scored)} are scored"
+    return (
+        None if len(names) == len(scored) else f"{plural(len(names), 'class', 'classes')}, and {len(scored)} are scored"
+    )
 
 
 def _fault_of_ids(largest: int, classes: ClassSet) -> str | None:

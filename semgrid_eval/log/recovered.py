@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from semgrid_eval.words import plural
+
 RECORD = "semgrid.recovery"
 _UNKNOWN = "unknown"
 
@@ -32,6 +34,7 @@ class Recovered:
         return Recovered(lost, ", ".join(filter(None, (earlier.unproved, self.unproved))))
 
     def __str__(self) -> str:
-        lost = "an unknown number of" if self.lost_messages is None else str(self.lost_messages)
+        count = self.lost_messages
+        lost = "an unknown number of messages" if count is None else plural(count, "message")
         kept = f"; nothing proves that these are whole: {self.unproved}" if self.unproved else ""
-        return f"was recovered from a damaged log, of which {lost} messages are lost{kept}"
+        return f"was recovered from a damaged log, which lost {lost}{kept}"

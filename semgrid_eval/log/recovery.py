@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from semgrid_eval.log.losses import Loss
+from semgrid_eval.words import plural
 
 MOST_LOSSES = 100
 """How many stretches are told of one by one."""
@@ -51,14 +52,14 @@ class Recovery:
         """Say it in lines."""
         saved = sum(self.saved.values())
         if self.is_whole:
-            yield f"is whole: {saved} messages, copied as they are to {self.out}"
+            yield f"is whole: {plural(saved, 'message')}, copied as they are to {self.out}"
             return
         of = "an unknown number of" if self.total is None else str(sum(self.total.values()))
         yield f"recovered {saved} of {of} messages to {self.out}"
         for loss in self.losses[:MOST_LOSSES]:
             yield f"lost: {loss}"
         if len(self.losses) > MOST_LOSSES:
-            yield f"lost: {len(self.losses) - MOST_LOSSES} more stretches"
+            yield f"lost: {plural(len(self.losses) - MOST_LOSSES, 'more stretch', 'more stretches')}"
         yield from (f"lost: {name}" for name in self.lost_files)
         for topic, count in (self.lost or {}).items():
             total = f" of {self.total[topic]}" if self.total is not None else ""

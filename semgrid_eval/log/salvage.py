@@ -49,6 +49,10 @@ _READERS: dict[int, Any] = {
 }
 _NEVER_IN_CHUNKS = (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA, Opcode.MESSAGE_INDEX, Opcode.DATA_END)
 _LAST = (Opcode.DATA_END, Opcode.FOOTER)
+_UNPROVED = "a chunk has no checksum, so nothing shows that it is whole"
+_UNMATCHED = "a chunk does not match its checksum"
+_OF_ITS_SIZE = (_UNPROVED, _UNMATCHED)
+"""Faults of chunks whose inner size agrees, so that they end where they say."""
 # Opcode and length of what proves itself; no such record has 2^40 bytes.
 _PROVABLE = re.compile(rb"[\x06\x09\x0f](?=.{5}\x00{3})", re.DOTALL)
 
@@ -117,7 +121,7 @@ class _Walk:
         reason = self._fault(part)
         if not reason:
             return part
-        if self._is_framed(part):
+        if reason in _OF_ITS_SIZE or self._is_framed(part):
             return Hole(at, part.end, reason, part.opcode)
         return Hole(at, self._found_again(at + 1), reason)
 
@@ -157,11 +161,11 @@ class _Walk:
         if len(body) != _CHUNK_BYTES + len(chunk.compression.encode()) + len(chunk.data):
             return "a chunk is not of the size it declares"
         if not chunk.uncompressed_crc and not self._proved:
-            return "a chunk has no checksum, so nothing shows that it is whole"
+            return _UNPROVED
         try:
             unpack_chunk(chunk)
         except DAMAGE:
-            return "a chunk does not match its checksum"
+            return _UNMATCHED
         return ""
 
     def _attachment_fault(self, body: bytes) -> str:
@@ -174,22 +178,12 @@ class _Walk:
         return ""
 
     def _is_framed(self, part: Part) -> bool:
-        """Tell whether a damaged record ends where it says: a second length in it agrees, or another record follows."""
-        if part.opcode == Opcode.CHUNK and self._sizes_agree(part):
-            return True
+        """Tell whether a damaged record ends where it says: another record follows."""
         try:
             after = self._part(part.end)
         except McapError:
             return False
         return after.opcode in _NEVER_IN_CHUNKS and not self._fault(after)
-
-    def _sizes_agree(self, part: Part) -> bool:
-        body = body_of(self._stream, part)
-        try:
-            chunk = read_chunk(body)
-        except DAMAGE:
-            return False
-        return len(body) == _CHUNK_BYTES + len(chunk.compression.encode()) + len(chunk.data)
 
     def _is_followed(self, at: int) -> bool:
         try:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from semgrid_eval.log.contract import Clock, Contract, Latency, Range, TopicContract, topics_of
 from semgrid_eval.log.findings import Finding
 from semgrid_eval.log.topics import LABEL, camera_topic
+from semgrid_eval.words import plural
 
 _NS_PER_S = 1e9
 
@@ -34,7 +35,7 @@ def judged(limit: Range | None, place: str, value: float, text: str) -> Iterator
 def timing(topic: str, expected: TopicContract, timeline: Timeline, camera: str) -> Iterator[Finding]:
     """Compare the times of a topic's messages with what is expected; `camera` is what its name was made for."""
     times_ns = _logged(timeline, topic)
-    yield from judged(expected.messages, f"{topic}: messages", len(times_ns), f"has {len(times_ns)} messages")
+    yield from judged(expected.messages, f"{topic}: messages", len(times_ns), f"has {plural(len(times_ns), 'message')}")
     if expected.missing_beside is not None:
         (other,) = topics_of(expected.missing_beside.topic, (camera,)).values()
         wanted = set(_logged(timeline, other))
@@ -105,7 +106,7 @@ def _steps(topic: str, expected: TopicContract, times_ns: Sequence[int]) -> Iter
     if not steps_ns:
         return
     repeated = steps_ns.count(0)
-    text = f"has {repeated} messages with the time of the message before"
+    text = f"has {plural(repeated, 'message')} with the time of the message before"
     wrong = list(judged(expected.repeated_times, f"{topic}: repeated_times", repeated, text))
     yield from wrong
     period_ns = median(steps_ns)

@@ -1,5 +1,6 @@
 """A model's file and what it imports from beside it, found while its code runs and at no other time."""
 
+import ast
 import importlib
 import importlib.util
 import sys
@@ -10,7 +11,10 @@ from pathlib import Path
 from types import ModuleType
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.files import digest_files, digest_value
+from semgrid_eval.files import digest_files, digest_value, read_bytes
+
+_MAKING_NAMES = {"*", "exec", "globals", "locals", "vars", "setattr", "__getattr__"}
+"""Where code has one of these, other names may be defined than those that are written in it."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,36 @@ def require_python(path: Path) -> None:
     if not path.is_file():
         fault = "is not a file" if path.exists() else "is not there"
         raise InputError(f"{fault}; a model is given as path.py:Class", path=path)
+
+
+def require_defined(path: Path, name: str) -> None:
+    """Make sure, without running a Python file, that it may define a name; files that make names are not judged.
+
+    Raises:
+        InputError: it is not Python code, or nothing in it has that name.
+    """
+    try:
+        code = ast.parse(read_bytes(path), filename=path.name)
+    except (SyntaxError, ValueError, RecursionError) as error:
+        raise InputError(f"is not Python code: {error}", path=path) from None
+    named = set().union(*map(_names_of, ast.walk(code)))
+    if name not in named and not named & _MAKING_NAMES:
+        raise undefined(path, name)
+
+
+def undefined(path: Path | str, name: str) -> InputError:
+    """Say that a file does not define a name."""
+    return InputError(f"defines no {name!r}", path=path)
+
+
+def _names_of(node: ast.AST) -> set[str]:
+    """Return the names that a piece of code binds or reads."""
+    match node:
+        case ast.ClassDef(name=name) | ast.FunctionDef(name=name) | ast.Name(id=name) | ast.Attribute(attr=name):
+            return {name}
+        case ast.alias(name=name, asname=asname):
+            return {asname or name.partition(".")[0]}
+    return set()
 
 
 class ModelFile:

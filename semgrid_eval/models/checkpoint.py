@@ -101,18 +101,17 @@ class TrainingFolder:
     def _was_finished(self) -> bool:
         if not (self._weights.is_file() and self._history.is_file()):
             return False
+        read_history(self._history, owner=self._key)  # small, and another training's is told by it
         read_header(self._weights, owner=self._key)
-        read_history(self._history, owner=self._key)
         return True
 
 
 def find_finished(trainings: Path, key: str) -> Path | None:
     """Find the folder of a finished training by its key, whoever has trained it, and whatever the folder's name."""
     for folder in sorted(trainings.iterdir()) if trainings.is_dir() else ():
-        with suppress(ResultError):
-            read_history(folder / HISTORY_FILE, owner=key)
-            read_header(folder / WEIGHTS_FILE, owner=key)
-            return folder
+        with suppress(ResultError):  # another training's
+            if TrainingFolder(folder, key).is_complete():
+                return folder
     return None
 
 

@@ -10,6 +10,7 @@ from semgrid_eval.classes import CLASS_COUNT, DEFAULT_CLASSES, ClassSet
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError
 from semgrid_eval.windows.data import WindowBatch, WindowSet
+from semgrid_eval.words import plural
 
 if TYPE_CHECKING:  # building grids needs the log readers; models do not
     from semgrid_eval.grids.truth import Truth
@@ -42,10 +43,10 @@ class Given:
         return self.grids * self.classes.count
 
     def described(self) -> dict[str, object]:
-        """Return all of it as JSON values, for digests; the default classes are left out."""
+        """Return what determines a model as JSON values, for digests; the default classes are left out."""
         told = {key: value for key, value in vars(self).items() if key != "classes"}
-        is_default = self.classes == DEFAULT_CLASSES
-        return told if is_default else {**told, "classes": self.classes.model_dump(mode="json")}
+        is_default = self.classes.means(DEFAULT_CLASSES)
+        return told if is_default else {**told, "classes": self.classes.identity()}
 
 
 class AnswersIn(NamedTuple):
@@ -168,7 +169,7 @@ def require_answer(answer: object, batch: WindowBatch, model: Model) -> Tensor:
     needed = (count, classes.count, rows, columns)
     if answer.ndim == 4 and answer.shape[1] < classes.count and answer.shape[0] == count:
         missing = ", ".join(classes.names[answer.shape[1] :])
-        raise InputError(f"scores {answer.shape[1]} classes, and {missing} are missing", field=name)
+        raise InputError(f"scores {plural(answer.shape[1], 'class', 'classes')}, and {missing} are missing", field=name)
     if answer.shape != needed:
         raise InputError(f"gave shape {tuple(answer.shape)} where {needed} is needed", field=name)
     if not answer.is_floating_point():

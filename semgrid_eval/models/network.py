@@ -16,6 +16,7 @@ from semgrid_eval.models.certainty import Certainty
 from semgrid_eval.models.device import Precision, choose_precision, seeded
 from semgrid_eval.models.model import Given, Model, one_hot
 from semgrid_eval.windows.data import WindowBatch, WindowSet
+from semgrid_eval.words import plural
 
 Constants = Literal["keras", "torch"]
 _IGNORED = -100
@@ -74,7 +75,9 @@ class TrainingConfig(Config):
     @model_validator(mode="after")
     def _epoch_holds_a_batch(self) -> Self:
         if self.updates_until(1) < 1:
-            raise ValueError(f"an epoch of {self.updates_per_epoch} windows does not fill a batch of {self.batch}")
+            raise ValueError(
+                f"an epoch of {plural(self.updates_per_epoch, 'window')} does not fill a batch of {self.batch}"
+            )
         return self
 
     def updates_until(self, epoch: int) -> int:

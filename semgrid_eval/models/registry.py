@@ -9,7 +9,7 @@ from pathlib import Path
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.faults import not_one_of
-from semgrid_eval.models.beside import Code, ModelFile, require_python
+from semgrid_eval.models.beside import Code, ModelFile, require_python, undefined
 from semgrid_eval.models.host import end_guests, known_answers, learn_answers
 from semgrid_eval.models.model import Model
 from semgrid_eval.models.own import guarded, one_line
@@ -146,7 +146,7 @@ def _from_file(spec: str) -> tuple[ModelFile, type[Model]]:
         with one_line(path):
             module = file.load()
         if not hasattr(module, name):
-            raise InputError(f"defines no {name!r}", path=path)
+            raise undefined(path, name)
         _loaded[spec] = file, guarded(getattr(module, name), spec, file)
     return _loaded[spec]
 

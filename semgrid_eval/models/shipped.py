@@ -13,6 +13,7 @@ from semgrid_eval.models.checkpoint import load_weights, read_header
 from semgrid_eval.models.model import Given, Model
 from semgrid_eval.models.residual import Residual, ResidualSettings
 from semgrid_eval.windows.data import WindowBatch
+from semgrid_eval.words import plural
 
 WEIGHTS = Path("data") / "residual-town-v1.safetensors"
 CELL_M = 100 / 128
@@ -43,9 +44,9 @@ class TownResidual(Model, torch.nn.Module):
         That is one sensor, two inputs moved to the target's time, and the paper's cells and classes.
         """
         if given.grids != _INPUTS or given.inputs != _INPUTS:
-            asked = f"{len(given.sensors)} sensors and {given.inputs} inputs"
+            asked = f"{plural(len(given.sensors), 'sensor')} and {plural(given.inputs, 'input')}"
             raise ConfigError(f"was trained on {_INPUTS} inputs of one sensor, not {asked}", field="model")
-        if given.classes != DEFAULT_CLASSES:
+        if not given.classes.means(DEFAULT_CLASSES):
             names = ", ".join(given.classes.names)
             raise ConfigError(f"was trained on the default classes, and grid.classes has {names}", field="model")
         if not given.translate:

@@ -67,7 +67,7 @@ def model_of(scored: Scored, row: Row, sources: Sources) -> Model:
     settings = made.parse_settings(row.settings)
     if issubclass(made, Network):
         network = seeded_network(made, settings, row.given, record.seed or 0)
-        load_weights(network, _training_of(record, sources.trainings) / WEIGHTS_FILE)
+        load_weights(network, _training_of(record, row, sources.trainings) / WEIGHTS_FILE)
         return network.eval()
     if made.learns():
         return _learned_again(record, row, sources)
@@ -75,10 +75,11 @@ def model_of(scored: Scored, row: Row, sources: Sources) -> Model:
         return fit_model(made, settings, Lesson(row.given, record.seed or 0, _CPU)).model
 
 
-def _training_of(record: ResultRecord, trainings: Path) -> Path:
+def _training_of(record: ResultRecord, row: Row, trainings: Path) -> Path:
     """Find the folder of the training by which a result has its id."""
+    config = {**record.config, "grid": row.grid.identity()}
     for folder in sorted(trainings.iterdir()) if trainings.is_dir() else ():
-        if id_of_result(record.config, record.windows_id, folder.name, record.seed) == record.id:
+        if id_of_result(config, record.windows_id, folder.name, record.seed) == record.id:
             return folder
     raise InputError("its training is not among them; name their folder with --trainings", path=trainings)
 

@@ -111,7 +111,7 @@ def _first_with(file: str, run: Path, row: results.RowRecord) -> tuple[results.R
     folder = next((folder for folder in folders if (folder / file).is_file()), None)
     if folder is None:
         raise InputError("none of its results kept its predictions", path=run, field=f"row {row.name}")
-    record = results.read_result(folder)
+    record = results.read_run(run).shown(results.read_result(folder))
     return record, parse_config(GridConfig, record.config.get("grid"), path=folder / "result.json"), folder
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.geometry import SE3, Quaternion, quaternion_of
+from semgrid_eval.words import plural
 
 MAX_POINTS = 1 << 22
 """Some ten times as many as any LiDAR gives in one turn."""
@@ -55,7 +56,7 @@ class LidarSweep:
             raise InputError(f"has {count} points; at most {MAX_POINTS} are allowed")
         for what, values in (("labels", self.label_id), ("intensities", self.intensity)):
             if values is not None and len(values) != count:
-                raise InputError(f"has {len(values)} {what} for {count} points")
+                raise InputError(f"has {what} of {len(values)} and places of {plural(count, 'point')}")
         within = (np.abs(self.points_m) <= MAX_RANGE_M).all(axis=1)  # what is not a number is not, either
         if not within.all():
             number = int(np.flatnonzero(~within)[0])

@@ -56,7 +56,7 @@ class RunData:
         self._folder = logs
         self._logs = find_logs(logs)
         self.cache, self._executor, self._stage = cache, executor, stage
-        self._storage = Storage(device, cache)
+        self._storage = Storage(device, cache, stage)
         self._configs = {grid_digest(row.grid): row.grid for row in rows}
         self._sensors = defaultdict[str, list[str]](list)
         for row in rows:
@@ -151,5 +151,5 @@ class RunData:
 
 
 def grid_digest(config: GridConfig) -> str:
-    """Digest a grid configuration."""
-    return digest_value(config.model_dump(mode="json"))
+    """Digest what determines the grids of a configuration."""
+    return digest_value(config.identity())

@@ -50,7 +50,7 @@ class Job:
     seed: int | None
     resolved: Resolved
     result_id: str  # names the result's folder
-    config: dict[str, object]  # what determined it, for the record
+    config: dict[str, object]  # what determined it, for the record, and the colours of its classes
     scored: WindowSet  # validation windows; `windows_id` names their file
     windows_id: str
     training: Training | None  # what is learned from, if anything
@@ -64,7 +64,10 @@ def id_of_windows(row: Row, scored: WindowSet) -> str:
 
 
 def id_of_result(config: Mapping[str, object], windows_id: str, training_id: str | None, seed: int | None) -> str:
-    """Digest all that decides a result: its row with what that depends on, its windows, and what was learned."""
+    """Digest all that decides a result: its row with what that depends on, its windows, and what was learned.
+
+    The grid in `config` is its identity: colours decide nothing.
+    """
     return digest_value([results.FORMAT_VERSION, SCORING_VERSION, config, windows_id, [training_id, seed]])
 
 

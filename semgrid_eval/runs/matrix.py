@@ -15,9 +15,10 @@ from semgrid_eval.class_files import with_classes
 from semgrid_eval.config import Config, load_yaml, merged, parse_config
 from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.faults import meant, not_one_of, shown
-from semgrid_eval.models.beside import require_python
+from semgrid_eval.models.beside import require_defined, require_python
 from semgrid_eval.models.registry import is_named, model_names
 from semgrid_eval.runs.row import Row
+from semgrid_eval.words import plural
 
 ROW_LIMIT = 10_000
 MAX_SEED = 1 << 53  # whoever reads JSON has whole numbers up to here
@@ -82,10 +83,11 @@ def _require_model(name: str) -> None:
             require_python(Path(file))
             if not cls.isidentifier():
                 raise ConfigError(f"{cls!r} is not the name of a class; a model is given as path.py:Class", path=file)
+            require_defined(Path(file), cls)
         elif name not in (known := model_names()):
             raise ConfigError(f"{not_one_of(name, [*known, 'path.py:Class'])}")
     except InputError as error:
-        raise ConfigError(str(error), field="--model") from None
+        raise ConfigError(str(error), field="model") from None
 
 
 def _read(name: str, *above: Path) -> tuple[_MatrixFile, Path]:
@@ -192,10 +194,19 @@ def _expanded(file: _MatrixFile, path: Path) -> Iterator[tuple[str, dict[str, An
         axes = parse_config(_WithAxes, {"axes": whole.pop("axes", {})}, path=f"{path}: {place}").axes
         number += math.prod(len(values) for values in axes.grid.values()) * max(map(len, axes.zip.values()), default=1)
         if number > ROW_LIMIT:
-            raise ConfigError(f"give {number} rows, and {ROW_LIMIT} are allowed", path=path, field="axes")
+            raise ConfigError(f"give {plural(number, 'row')}, and {ROW_LIMIT:,} are allowed", path=path, field="axes")
         for values in _combinations(axes, f"{path}: {place}"):
             filled = _fill(whole, values, f"{path}: {place}")
+            _refuse_class_file(filled, f"{path}: {place}")
             yield place, _with_bases(filled, file.models)
+
+
+def _refuse_class_file(row: dict[str, Any], place: str) -> None:
+    """Refuse the file of a class set that an axis names; all others are read by now."""
+    grid = row.get("grid")
+    if isinstance(grid, dict) and isinstance(name := grid.get("classes"), str):
+        fault = f"{name!r} comes from an axis, and all rows of a matrix have the same classes: name it under defaults"
+        raise ConfigError(fault, path=place, field="grid.classes")
 
 
 def _with_bases(row: dict[str, Any], models: dict[str, dict[str, Any]]) -> dict[str, Any]:
@@ -223,6 +234,7 @@ def _combinations(axes: _Axes, place: str) -> Iterator[dict[str, Any]]:
 
 def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, Any]:
     for key, value in values.items():
+        _require_settable(row, key, place)
         nested: Any = value
         for part in reversed(key.split(".")):
             nested = {part: nested}
@@ -235,3 +247,18 @@ def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, 
     if "{" in name:
         raise ConfigError(f"{name!r} has a place that no axis fills", path=place, field="name")
     return row | {"name": name}
+
+
+def _require_settable(row: dict[str, Any], key: str, place: str) -> None:
+    """Make sure that an axis, a dotted name, can be set in a row: all above it are mappings, or not there."""
+    *above, last = key.split(".")
+    if not all((*above, last)):
+        raise ConfigError(f"{key!r} is not a dotted name of a setting", path=place, field="axes")
+    found: Any = row
+    for number, part in enumerate(above, start=1):
+        found = found.get(part, {})
+        if found is None:  # not set
+            return
+        if not isinstance(found, dict):
+            fault = f"must be a mapping of keys to values, as the axis {key} sets one, not {shown(found)}"
+            raise ConfigError(fault, path=place, field=".".join(above[:number]))

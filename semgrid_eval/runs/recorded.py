@@ -22,6 +22,7 @@ from semgrid_eval.streams.schedule import Recorded, Times
 from semgrid_eval.windows.data import WindowSet
 from semgrid_eval.windows.grids import GridData
 from semgrid_eval.windows.lead import period_ns
+from semgrid_eval.words import plural
 
 Grids = NDArray[np.uint8]
 _LIMIT_BYTES = 8 << 30  # of the grids of one log in memory
@@ -91,7 +92,9 @@ class PredictionLogs:
         count, (rows, columns, *_) = len(self.times(recording).for_ns), self._extent
         path = self.path(recording)
         if count * rows * columns * 2 > _LIMIT_BYTES:
-            raise LogError(f"holds {count} predictions, more than {_LIMIT_BYTES >> 30} GiB of them", path=path)
+            raise LogError(
+                f"holds {plural(count, 'prediction')}, more than {_LIMIT_BYTES >> 30} GiB of them", path=path
+            )
         found = np.full((count, 2, rows, columns), _CERTAIN, np.uint8)
         with PredictionLog(path, self._topic) as log:
             if log.digest != self._digests[recording]:

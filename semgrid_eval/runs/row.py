@@ -19,6 +19,7 @@ from semgrid_eval.scores.facts import RowFacts, StreamFacts
 from semgrid_eval.streams.config import StreamConfig
 from semgrid_eval.windows.disturb.kinds import AnyDisturbance
 from semgrid_eval.windows.plan import WindowConfig
+from semgrid_eval.words import plural
 
 
 def _found(model: str) -> type[Model] | None:
@@ -99,7 +100,7 @@ class Row(Config):
             )
         reach, target = self.window.span_frames + self.train_leads[1], self.window.target_frame
         if target is not None and reach > target:
-            raise ValueError(f"train_leads: reach back {reach} frames, and target_frame is {target}")
+            raise ValueError(f"train_leads: reach back {plural(reach, 'frame')}, and target_frame is {target}")
 
     def _check_disturb(self) -> None:
         if self.disturb is None:
@@ -161,12 +162,13 @@ class Row(Config):
         return _found(self.model)
 
     def identity(self) -> dict[str, object]:
-        """Return what determines the row's numbers, besides code and logs: all but its name and repeats.
+        """Return what determines the row's numbers, besides code and logs: all but its name, repeats and colours.
 
         A second target that is not asked for changes no id.
         """
         unset = {"second_target"} if self.second_target is None else set()
-        return self.model_dump(mode="json", exclude={"name", "repeats", *unset})
+        written = self.model_dump(mode="json", exclude={"name", "repeats", "grid", *unset})
+        return {**written, "grid": self.grid.identity()}
 
     @property
     def asked(self) -> Truth | None:
@@ -227,7 +229,7 @@ class Row(Config):
     def label(self) -> str:
         """Name and, in words, what the row does; the horizon is always said (reading 2)."""
         horizon, lead_ms = self.scored_window.horizon_steps, self.scored_window.lead_ms
-        steps = f"{horizon} step{'s' if horizon > 1 else ''} of {self.scored_window.step_frames} frames ahead"
+        steps = f"{plural(horizon, 'step')} of {plural(self.scored_window.step_frames, 'frame')} ahead"
         parts = [self.words, *self._inputs_in_words]
         if self.stream is None or self.stream.asked == "fixed":
             parts.append(steps if lead_ms is None else f"{lead_ms:g} ms ahead")
@@ -240,7 +242,7 @@ class Row(Config):
         if self.answers_in is not None:
             return []
         moved = "moved to the target's time" if self.translate else "not moved"
-        return [moved, f"{self.window.inputs} inputs"]
+        return [moved, plural(self.window.inputs, "input")]
 
 
 class Unit(NamedTuple):

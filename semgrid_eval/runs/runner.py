@@ -161,7 +161,7 @@ def make_worker(matrix: Matrix, logs: Path, out: Path, options: RunOptions, stag
 
     def made(folder: Path) -> GridSource:
         if is_packed(folder):
-            return PackedGrids(folder, matrix.rows, Storage(place, options.grids))
+            return PackedGrids(folder, matrix.rows, Storage(place, options.grids, stage))
         executor = options.grid_executor
         return RunData(folder, options.grids, matrix.rows, executor=executor, device=place, stage=stage)
 

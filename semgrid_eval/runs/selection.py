@@ -13,6 +13,7 @@ from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import GridData
 from semgrid_eval.windows.lead import frames_of
 from semgrid_eval.windows.plan import WindowConfig, WindowPlan
+from semgrid_eval.words import plural
 
 WindowPlanner = Callable[[Sequence[int], WindowConfig, Sequence[int]], WindowPlan]
 
@@ -56,7 +57,7 @@ def wanted_lead(config: WindowConfig, grids: GridData) -> tuple[int, ...]:
         if end - begin > 1:  # there is a rate
             frames[frames_of(config.lead_ms, grids.stamps_ns[begin:end])] = name
     if len(frames) > 1:
-        counts = " and ".join(f"{count} frames of {name}" for count, name in sorted(frames.items())[:2])
+        counts = " and ".join(f"{plural(count, 'frame')} of {name}" for count, name in sorted(frames.items())[:2])
         raise InputError(f"{config.lead_ms:g} ms are {counts}; score recordings of one rate", field="window.lead_ms")
     return tuple(frames) or (1,)
 

@@ -37,8 +37,12 @@ def parts_of(truth: Truth, windows: WindowSet, config: GridConfig) -> Iterator[P
     targets, inputs = windows.target_frames.cpu().numpy(), windows.inputs.cpu().numpy()
     owners, _ = data.locate(targets)
     first_ns = data.stamps_ns[data.first_frames[owners]]
-    for log, digest in dict(zip(data.logs, data.digests, strict=True)).items():
-        chosen = np.flatnonzero(np.array(data.logs)[owners] == log)
+    digests = dict(zip(data.logs, data.digests, strict=True))
+    place = {log: number for number, log in enumerate(digests)}
+    log_of = np.array([place[log] for log in data.logs])[owners]
+    begins = np.cumsum(np.bincount(log_of, minlength=len(digests)))[:-1]
+    chosen_of = np.split(np.argsort(log_of, kind="stable"), begins)
+    for (log, digest), chosen in zip(digests.items(), chosen_of, strict=True):
         if len(chosen):
             times = WindowTimes(first_ns[chosen], data.stamps_ns[inputs[chosen]], data.stamps_ns[targets[chosen]])
             yield Part(chosen, Question(truth, Path(log), digest, config, times))

@@ -85,7 +85,8 @@ class Worker:
         if asks_of_truth(row) and self.scored_data.cache is not None:
             config["truth"] = truth_versions()
         result_id = id_of_result(config, windows_id, training.id if training else None, seed)
-        return Job(row, seed, resolved, result_id, config, scored, windows_id, training, left_out, stream)
+        shown = {**config, "grid": row.grid.model_dump(mode="json")}
+        return Job(row, seed, resolved, result_id, shown, scored, windows_id, training, left_out, stream)
 
     def stream(self, row: Row) -> StreamPlan:
         """Plan the stream of a row: over all recordings that are scored, from their first frames to their last."""

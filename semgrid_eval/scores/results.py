@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from semgrid_eval.arrays import read_arrays
 from semgrid_eval.class_files import classes_of_grid
-from semgrid_eval.classes import ClassSet
+from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError, ResultError, first_line
 from semgrid_eval.scores.facts import RowFacts, StreamRecord
@@ -134,6 +134,22 @@ class RunRecord(Config):
     logs: tuple[LogRecord, ...]
     failed_logs: dict[str, str]  # log path -> reason
     rows: tuple[RowRecord, ...]
+
+    @property
+    def classes(self) -> ClassSet:
+        """The classes of all its rows, in the colours that its matrix had when it was last run."""
+        rows = self.matrix.get("rows")
+        first = rows[0] if isinstance(rows, list) and rows else None
+        return classes_of_grid(first.get("grid") if isinstance(first, dict) else None, f"{RUN_FILE}: matrix")
+
+    def shown(self, result: ResultRecord) -> ResultRecord:
+        """Return a result of this run in the run's colours, which may have changed since it was made."""
+        grid, classes = result.config.get("grid"), self.classes
+        if not isinstance(grid, dict) or classes == result.classes or not classes.means(result.classes):
+            return result
+        written = {} if classes == DEFAULT_CLASSES else {"classes": classes.model_dump(mode="json")}
+        others = {key: value for key, value in grid.items() if key != "classes"}
+        return result.model_copy(update={"config": {**result.config, "grid": others | written}})
 
 
 R = TypeVar("R", RunRecord, ResultRecord)

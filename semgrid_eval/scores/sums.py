@@ -12,6 +12,7 @@ from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.errors import ResultError
 from semgrid_eval.scores.metrics.table import METRICS, Sums, metrics_of
 from semgrid_eval.scores.regions.table import PARTITIONS
+from semgrid_eval.words import plural
 
 SUMS_FILE, EXPECTED_FILE = "sums.npz", "expected.npz"
 
@@ -46,7 +47,7 @@ def check_sums(folder: Path, windows: int, classes: ClassSet = DEFAULT_CLASSES, 
     for file in (SUMS_FILE, EXPECTED_FILE) if has_expected else (SUMS_FILE,):
         for key, found in _read_sums(folder / file, list(product(METRICS, PARTITIONS)), classes).items():
             if len(found) != windows:
-                fault = f"has {len(found)} windows, and result.json {windows}"
+                fault = f"has {plural(len(found), 'window')}, and result.json {windows}"
                 raise ResultError(fault, path=folder / file, field=".".join(key))
 
 

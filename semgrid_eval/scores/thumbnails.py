@@ -96,7 +96,7 @@ def read_pictures(path: Path) -> LogPictures:
     images = _cut(arrays, "images", "image_ends", path)
     labels = _cut(arrays, "labels", "label_ends", path)
     if not len(stamps_ns) == len(images) == len(labels):
-        raise ResultError(f"{len(stamps_ns)} frames have {len(images)} images and {len(labels)} labels", path=path)
+        raise ResultError(f"frames: {len(stamps_ns)}, images: {len(images)}, labels: {len(labels)}", path=path)
     frames = {stamp: FramePictures(*files) for stamp, *files in zip(stamps_ns, images, labels, strict=True)}
     return LogPictures(_track(arrays, path), frames, _faults(arrays, path))
 

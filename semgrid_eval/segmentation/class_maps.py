@@ -14,6 +14,7 @@ from semgrid_eval.config import Config, load_yaml, parse_config
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.faults import meant, not_one_of, shown
 from semgrid_eval.labels import CITYSCAPES_LABELS, LABEL_ID
+from semgrid_eval.words import plural
 
 CITYSCAPES, CITYSCAPES_IDS = "cityscapes", "cityscapes-ids"
 _IN_FILES = ("mapillary", "ade20k")
@@ -88,7 +89,11 @@ def _read(path: Path, name: str) -> ClassMap:
     if file.base is not None:
         return _changed(path, name, file)
     if not 2 <= len(file.classes) <= _MOST:
-        raise ConfigError(f"has {len(file.classes)} classes; 2 to {_MOST} are possible", path=path, field="classes")
+        raise ConfigError(
+            f"has {plural(len(file.classes), 'class', 'classes')}; 2 to {_MOST} are possible",
+            path=path,
+            field="classes",
+        )
     classes = _in_order(path, file)
     return ClassMap(name, classes, tuple(file.classes[each] for each in classes))
 

@@ -14,6 +14,7 @@ from semgrid_eval.segmentation.class_maps import find_class_map, maps_of
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.pixels import best_class, network_input, size_of
 from semgrid_eval.segmentation.session import open_model, words_of
+from semgrid_eval.words import plural
 
 _VOID = 255
 Shape = Sequence[int | str | None]
@@ -155,7 +156,10 @@ class SegmentationNetwork:
         known = self.class_map
         if not known.fewest <= count <= len(known.labels):
             others = "".join(f"; --classes {name} has so many" for name in maps_of(count))
-            raise self._error(f"scores {count} classes; {known.name} has {len(known.labels)}{others}", self._output)
+            raise self._error(
+                f"scores {plural(count, 'class', 'classes')}; {known.name} has {len(known.labels)}{others}",
+                self._output,
+            )
 
     def _error(self, message: str, tensor: _Tensor) -> InputError:
         return InputError(message, path=self._path, field=tensor.name)

@@ -125,7 +125,7 @@ def measure_chain(
                 if found.frames == amount.frames:
                     return found
     if not found.frames:
-        seen = f"{whole} frames of the logs have all inputs ({WINDOW.span_frames} frames back)"
+        seen = f"frames of the logs with all inputs ({WINDOW.span_frames} frames back): {whole}"
         raise InputError(f"{amount.warm_up} leaves no frame to measure: {seen}; give more logs", field="warm_up")
     return found
 

@@ -16,6 +16,7 @@ from semgrid_eval.windows.data import Targets, WindowSet, windows_at
 from semgrid_eval.windows.grids import GridData
 from semgrid_eval.windows.lead import frames_of
 from semgrid_eval.windows.plan import WindowConfig
+from semgrid_eval.words import plural
 
 BLOCK_S = 0.5
 """Length of what is counted together; the warm-up is rounded up to whole blocks."""
@@ -92,7 +93,7 @@ def plan_stream(
     parts = [part for part in found if len(part.evaluated)]
     if not any(len(part.answers.frame) for part in parts):
         reach = window.span_frames + 1
-        raise InputError(f"no recording has the {reach} frames that the inputs of one answer need")
+        raise InputError(f"no recording has the {plural(reach, 'frame')} that the inputs of one answer need")
     counts = np.cumsum([0, *(len(part.kept) for part in parts)])
     used = [np.where(part.used == NONE, NONE, part.used + start) for part, start in zip(parts, counts, strict=False)]
     columns = [np.concatenate(column) for column in zip(*(part.columns() for part in parts), strict=True)]

@@ -13,6 +13,7 @@ from semgrid_eval.config import Config, parse_config
 from semgrid_eval.errors import InputError
 from semgrid_eval.faults import not_one_of
 from semgrid_eval.files import read_json, write_json
+from semgrid_eval.words import plural
 
 STAGES = ("decode", "segment", "match", "grid", "align")
 """Stages of a chain before the model, in the order in which they come; a chain need not have all."""
@@ -56,7 +57,7 @@ class LatencyProfile(Config):
         (first, samples), *others = self._parts()
         for name, other in others:
             if len(other) != len(samples):
-                raise ValueError(f"{name} has {len(other)} samples, and {first} has {len(samples)}")
+                raise ValueError(f"{name} has {plural(len(other), 'sample')}, and {first} has {len(samples)}")
         return self
 
     @property

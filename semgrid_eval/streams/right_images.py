@@ -10,6 +10,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.files import read_bytes
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import DISPARITY, camera_topic
+from semgrid_eval.words import plural
 
 PNG_LIMIT_BYTES = 256 << 20
 
@@ -29,7 +30,8 @@ class RightImages:
         frames = sum(1 for _ in log.messages([camera_topic(camera, DISPARITY)]))
         if len(self._files) != frames:
             raise InputError(
-                f"holds {len(self._files)} PNG files, and {log.path} has {frames} frames", path=self._folder
+                f"holds {plural(len(self._files), 'PNG file')}, and {log.path} has {plural(frames, 'frame')}",
+                path=self._folder,
             )
 
     def read(self, number: int) -> bytes:

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from semgrid_eval.config import Config
 from semgrid_eval.errors import InputError
 from semgrid_eval.windows.lead import LONGEST_LEAD_MS, lead_from
+from semgrid_eval.words import plural
 
 Indices = NDArray[np.int32]
 
@@ -58,9 +59,8 @@ class WindowConfig(Config):
             raise ValueError("give one of lead_ms and horizon_steps")
         if self.lead_ms is None and self.target_frame is not None and self.target_frame < self.reach_frames:
             shape = f"inputs {self.inputs}, step_frames {self.step_frames} and horizon_steps {self.horizon_steps}"
-            raise ValueError(
-                f"target_frame {self.target_frame} is too early: {shape} reach back {self.reach_frames} frames"
-            )
+            reach = plural(self.reach_frames, "frame")
+            raise ValueError(f"target_frame {self.target_frame} is too early: {shape} reach back {reach}")
         return self
 
 
@@ -116,10 +116,8 @@ def validation_windows(
         turns = [few[index % len(few) :][:1] if few else [] for index, few in enumerate(fitting)]
         return _every_target(frame_counts, config, turns, min(leads))
     if target < config.span_frames + max(leads):
-        reach = config.span_frames + max(leads)
-        fault = (
-            f"{target} is too early: inputs and lead reach back {reach} frames; null takes every target that there is"
-        )
+        reach = plural(config.span_frames + max(leads), "frame")
+        fault = f"{target} is too early: inputs and lead reach back {reach}; null takes every target that there is"
         raise TooEarlyError(fault, field="window.target_frame")
     recordings = np.flatnonzero(np.array(frame_counts) > target)
     frames = np.array([config.frames(target, lead) for lead in leads], np.int32)
@@ -150,13 +148,11 @@ def _frames(count: int, config: WindowConfig, leads: Sequence[int]) -> Indices:
 
 def _plan(frame_counts: Sequence[int], windows: Windows, needed: int) -> WindowPlan:
     too_short = {
-        recording: f"has {count} frames, and a window needs {needed}"
+        recording: f"has {plural(count, 'frame')}, and a window needs {needed}"
         for recording, count in enumerate(frame_counts)
         if count < needed
     }
     if len(too_short) == len(frame_counts):
-        longest = max(frame_counts, default=0)
-        raise InputError(
-            f"a window needs {needed} frames, and the longest of {len(too_short)} recordings has {longest}"
-        )
+        longest = f"the longest recording (of {len(too_short)}) has {max(frame_counts, default=0)}"
+        raise InputError(f"a window needs {plural(needed, 'frame')}, and {longest}")
     return WindowPlan(windows, too_short)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from semgrid_eval.files import unnamed_file, writing
+from semgrid_eval.progress import Progress, Stage, silent_stage
 
 if TYPE_CHECKING:  # building grids needs the log readers; using built ones does not
     from semgrid_eval.grids.recording import RecordingGrids
@@ -31,6 +32,7 @@ class Storage:
 
     device: torch.device
     folder: Path | None = None
+    stage: Stage = silent_stage  # shows how far the cells are gathered, when they are asked for
 
 
 class Block(Protocol):
@@ -61,7 +63,7 @@ class GatheredBlock:
     """
 
     def __init__(self, recordings: Sequence["RecordingGrids"], sensors: Sequence[str], storage: Storage) -> None:
-        self._recordings, self._sensors = recordings, sensors
+        self._recordings, self._sensors, self._stage = recordings, sensors, storage.stage
         self._folder = storage.folder if storage.device.type == "cpu" else None
         self._file: BinaryIO | None = None
         frames = sum(len(recording.stamps_ns) for recording in recordings)
@@ -76,41 +78,43 @@ class GatheredBlock:
             ResultError: the file of a recording is gone or damaged.
             InputError: there is no room for the file that is mapped.
         """
-        found = self._held() if self._folder is None else self._mapped(self._folder)
+        with self._stage("gather") as progress:
+            found = self._held(progress) if self._folder is None else self._mapped(self._folder, progress)
         self._recordings = ()
         return found
 
-    def _held(self) -> Tensor:
+    def _held(self, progress: Progress) -> Tensor:
         grids = torch.empty(self.shape, dtype=torch.uint8, device=self.device)
-        for row, first, cells in self._parts():
+        for row, first, cells in self._parts(progress):
             grids[row, first : first + len(cells)] = torch.from_numpy(cells)
         return grids
 
-    def _mapped(self, folder: Path) -> Tensor:
+    def _mapped(self, folder: Path, progress: Progress) -> Tensor:
         file = unnamed_file(folder, math.prod(self.shape))
         with ExitStack() as stack:
             stack.callback(file.close)
-            self._write(file, folder)
+            self._write(file, folder, progress)
             found = _map(file, self.shape)
             stack.pop_all()
         self._file = file
         weakref.finalize(self, file.close)
         return found
 
-    def _write(self, file: BinaryIO, folder: Path) -> None:
+    def _write(self, file: BinaryIO, folder: Path, progress: Progress) -> None:
         _, frames, rows, columns = self.shape
-        for row, first, cells in self._parts():
+        for row, first, cells in self._parts(progress):
             with writing(folder):
                 file.seek((row * frames + first) * rows * columns)
                 file.write(cells.data)
                 file.flush()
 
-    def _parts(self) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
+    def _parts(self, progress: Progress) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
         first = 0
-        for recording in self._recordings:
+        for done, recording in enumerate(self._recordings, start=1):
             for row, name in enumerate(self._sensors):
                 yield row, first, np.ascontiguousarray(recording.cells(name))
             first += len(recording.stamps_ns)
+            progress(done, len(self._recordings), recording.name)
 
     def __reduce__(self) -> tuple[Callable[..., Block], tuple[object, ...]]:
         """Send the place of the file instead of its content."""

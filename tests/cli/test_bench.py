@@ -72,4 +72,4 @@ def test_an_unknown_part_is_one_line(monkeypatch, capsys):
         main(["bench", "--only", "render,tranining"])
     assert stopped.value.code == 1
     error = capsys.readouterr().err
-    assert error == f"Error: part: 'tranining' is not one of {', '.join(PARTS)}; did you mean training?\n"
+    assert error == f"Error: --only: 'tranining' is not one of {', '.join(PARTS)}; did you mean training?\n"

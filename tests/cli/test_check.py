@@ -46,7 +46,7 @@ def test_example_of_the_help_runs(logs, monkeypatch, capsys):
     place = "logs/val/a.mcap: warning: /camera/front/label: missing_beside"
     missing = "is missing (`semgrid-eval segment` adds it) for 3 of 6 messages of /camera/front/disparity"
     assert f"{place}: {missing} (allowed: at most 0)\n" in said.out
-    assert said.err.endswith("1 logs checked, 0 with errors\n")
+    assert said.err.endswith("1 log checked, 0 with errors\n")
 
 
 def test_damaged_log_gives_one_error_and_exit_code_3(logs, capsys):
@@ -80,7 +80,7 @@ def test_missing_log_is_a_mistake_of_the_user(logs, capsys):
 def test_strict_refuses_what_is_worth_a_look(logs, capsys):
     assert run("check", logs) == 0
     assert run("check", "--strict", logs) == 1
-    assert capsys.readouterr().err.endswith("1 logs checked, 1 with errors or warnings\n")
+    assert capsys.readouterr().err.endswith("1 log checked, 1 with errors or warnings\n")
 
 
 def test_the_schema_is_one():

@@ -1,9 +1,14 @@
 """How much a command says: usually, with -q and with -v; and patterns in place of the names of logs."""
 
+import io
+import re
+
+import click
 import pytest
 from click.testing import CliRunner
 from support.cityscapes_tree import Tree
 
+from semgrid_eval.cli.console import progress
 from semgrid_eval.cli.main import COMMANDS, cli
 from semgrid_eval.sources.known import SOURCES
 
@@ -36,12 +41,33 @@ def test_quiet_leaves_errors_alone_and_verbose_names_every_piece_of_work(tree):
     assert [line for line in usual if "/3" in line] != [line for line in verbose if "/3" in line]
 
 
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_what_a_stage_waits_for_has_a_bar_below_it(monkeypatch):
+    shown = Terminal()
+    monkeypatch.setattr("sys.stderr", shown)
+    monkeypatch.setenv("TERM", "xterm")
+    with click.Context(cli), progress("score a") as outer:
+        outer(1, 2, "first")
+        with progress("gather") as inner:
+            inner(3, 3, "last")
+        outer(2, 2)
+    lines = re.split(r"[\r\n]+", re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.getvalue()))
+    score, gather = [line for line in lines if line.strip()][-2:]
+    assert re.search(r"score a .* 2/2", score)
+    assert re.search(r"gather .* 3/3 .* last", gather)
+    assert shown.getvalue().count("\x1b[?25l") == 1, "one display hides the cursor"
+
+
 def test_warnings_are_said_with_quiet(tree):
     said("convert", "cityscapes", "tree", "logs")
     tree.write(range(2))
     (tree.root.parent / "logs" / "val" / "bonn_000000_000000.mcap").rename(tree.root.parent / "logs/val/other.mcap")
     (warning,) = said("convert", "cityscapes", "tree", "logs", "--quiet")
-    assert warning.startswith("Warning: logs holds 1 logs that do not belong")
+    assert warning.startswith("Warning: logs holds 1 log beside those of this conversion")
 
 
 def test_quiet_and_verbose_exclude_each_other(tree):
@@ -77,4 +103,4 @@ def test_a_log_whose_name_has_signs_of_a_pattern_is_itself(tree):
     said("convert", "cityscapes", "tree", "logs")
     log = tree.root.parent / "logs/val/bonn_000000_000000.mcap"
     log.rename(log.with_name("b[1].mcap"))
-    assert said("check", "logs/val/b[1].mcap")[-1] == "1 logs checked, 0 with errors"
+    assert said("check", "logs/val/b[1].mcap")[-1] == "1 log checked, 0 with errors"

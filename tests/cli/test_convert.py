@@ -92,7 +92,7 @@ def test_logs_of_an_earlier_conversion_are_a_warning_in_the_splits_converted_now
     assert run("convert", "cityscapes", other.root, logs, "--split", "val") == 0
     stray = logs / "val" / "aachen_000000_000000.mcap"
     *_, last, _ = capsys.readouterr().err.splitlines()
-    assert last == f"Warning: {logs} holds 1 logs that do not belong to this conversion, such as {stray}"
+    assert last == f"Warning: {logs} holds 1 log beside those of this conversion, such as {stray}"
 
 
 def test_when_every_recording_fails_there_is_no_other_error(tree, tmp_path, capsys):

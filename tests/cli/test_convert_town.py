@@ -82,7 +82,7 @@ def test_the_example_writes_logs_and_a_second_run_keeps_them_and_warns_of_others
     again = CliRunner().invoke(cli, arguments)
     assert again.output.endswith(
         "logs: 0 written, 2 up to date, 0 failed\n"
-        "Warning: logs holds 1 logs that do not belong to this conversion, such as logs/val/another.mcap\n"
+        "Warning: logs holds 1 log beside those of this conversion, such as logs/val/another.mcap\n"
     )
     assert [log.stat().st_mtime_ns for log in logs] == before
 
@@ -139,7 +139,7 @@ def test_logs_that_do_not_belong_are_a_warning(rendered, define, tmp_path, capsy
     shutil.copy(out / f"{LABELS[0]}.mcap", stray)
     code, lines = run(capsys, *benchmark_options(tmp_path, 1))
     assert code == 0
-    assert f"Warning: {tmp_path} holds 1 logs that do not belong to this conversion, such as {stray}" in lines
+    assert f"Warning: {tmp_path} holds 1 log beside those of this conversion, such as {stray}" in lines
 
 
 @pytest.mark.slow
@@ -169,10 +169,10 @@ def test_how_many_recordings_must_be_said(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        (["--width", "1000000"], "Error: width: "),
+        (["--width", "1000000"], "Error: --width: "),
         (["--towns", "1"], "Error: training and validation need different towns"),
-        (["--duration-s", "0"], "Error: duration_s: "),
-        (["--val-towns", "0"], "Error: val_towns: "),
+        (["--duration-s", "0"], "Error: --duration-s: "),
+        (["--val-towns", "0"], "Error: --val-towns: "),
     ],
 )
 def test_an_impossible_wish_is_one_line(option, message, tmp_path, capsys):

@@ -42,7 +42,7 @@ def test_processor_time_is_counted_on_one_thread_alone_and_said(logs, capsys):
     arguments = ["latency", "logs", "--processor-time", "--frames", "2", "--warm-up", "0", "--out", "profile.json"]
     with pytest.raises(SystemExit):
         main(arguments)
-    assert capsys.readouterr().err.startswith("Error: processor_time: is what a chain takes on one thread of a CPU")
+    assert capsys.readouterr().err.startswith("Error: --processor-time: is what a chain takes on one thread of a CPU")
     done = CliRunner().invoke(cli, [*arguments, "--threads", "1"])
     assert done.exit_code == 0, done.output
     assert read_profile(logs / "profile.json").made_by.machine["clock"] == "processor time"
@@ -70,9 +70,9 @@ def test_a_table_shows_stages_models_and_chains_with_their_shares():
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
-        (["--model", "fues"], "Error: model: 'fues' is not one of"),
-        (["--warm-up", "99"], "Error: warm_up: 99 leaves no frame to measure"),
-        (["--device", "tpu"], "Error: device: there is no device 'tpu' on this machine"),
+        (["--model", "fues"], "Error: --model: 'fues' is not one of"),
+        (["--warm-up", "99"], "Error: --warm-up: 99 leaves no frame to measure"),
+        (["--device", "tpu"], "Error: --device: there is no device 'tpu' on this machine"),
         (["--right", "nothing"], "Error: nothing/toy: is not a folder"),
     ],
 )

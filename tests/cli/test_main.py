@@ -12,6 +12,7 @@ from support.driving import driving
 
 import semgrid_eval
 from semgrid_eval.cli.main import cli, main
+from semgrid_eval.errors import InputError
 from semgrid_eval.log.store import write_log
 
 LIMIT_S = 60
@@ -185,3 +186,23 @@ def test_names_with_control_characters_are_shown_escaped(tmp_path, capsys):
     for text in (said.out, said.err):
         assert all(line.isprintable() for line in text.splitlines())
         assert "\\x1b[31mred\\u202e\\n.mcap" in text
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (InputError("is odd", field="any_machine"), "--any-machine: is odd"),
+        (InputError("is odd", field="out"), "--out: is odd"),
+        (InputError("is odd", field="matrix"), "matrix: is odd"),
+        (InputError("is odd", field="sensors"), "sensors: is odd"),
+        (InputError("is odd", path="a.yaml", field="out"), "a.yaml: out: is odd"),
+    ],
+)
+def test_an_option_is_named_as_it_is_typed_and_nothing_else_is(monkeypatch, tmp_path, capsys, error, line):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr("semgrid_eval.runs.matrix.load_matrix", fail)
+    with pytest.raises(SystemExit) as stop:
+        main(["run", "smoke", "--logs", str(tmp_path), "--out", str(tmp_path / "out")])
+    assert (stop.value.code, capsys.readouterr().err) == (1, f"Error: {line}\n")

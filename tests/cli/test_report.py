@@ -114,7 +114,7 @@ def test_a_gate_that_asks_for_what_is_not_there_is_refused(before_and_after, tmp
     before, after = before_and_after
     code, out, err = _run(capsys, "report", before, after, "--fail-below", "cars: -0.01", "--out", tmp_path / "page")
     assert (code, out) == (1, "")
-    assert err.startswith("Error: fail-below: 'cars' is not one of unknown, road, ")
+    assert err.startswith("Error: --fail-below: 'cars' is not one of unknown, road, ")
     assert err.endswith("did you mean car?\n")
     for arguments in ((before, "--fail-below", "car: 0"), (before, after, "--row", "ED-DC")):
         code, out, err = _run(capsys, "report", *arguments, "--out", tmp_path / "page")
@@ -126,7 +126,7 @@ def test_a_gate_that_asks_for_what_is_not_there_is_refused(before_and_after, tmp
 def test_a_report_of_several_runs_needs_a_folder_of_its_own(before_and_after, capsys):
     code, out, err = _run(capsys, "report", *before_and_after)
     assert (code, out) == (1, "")
-    assert err == "Error: out: the report of several runs belongs to none of them: name a folder\n"
+    assert err == "Error: --out: the report of several runs belongs to none of them: name a folder\n"
     assert not any((run / "report").exists() for run in before_and_after)
 
 

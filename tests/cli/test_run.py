@@ -149,7 +149,7 @@ def test_whatever_fails_is_one_line_each_and_the_others_go_on(here, tmp_path_fac
     assert [line for line in result.stderr.splitlines() if line.startswith("Error")] == [
         "Error: row small: bad.py:Small: gave shape (1, 10, 4, 4) where (1, 10, 128, 128) is needed",
         "Error: row nan: bad.py:NotANumber: gave scores that are NaN or infinite",
-        "Error: row far: a window needs 19 frames, and the longest of 1 recordings has 9",
+        "Error: row far: a window needs 19 frames, and the longest recording (of 1) has 9",
         "Error: bare.mcap: frame at 1000000000000000000 ns: has no label image; `semgrid-eval segment` adds them",
     ]
     assert [row.name for row in read_run(here / "run").rows if row.results] == ["BL-DC"]

@@ -114,7 +114,7 @@ def test_jitter_is_a_warning(tmp_path):
 
 def test_repeated_time_is_an_error(tmp_path):
     found = findings(tmp_path, lambda number, moment: shifted(moment, -FRAME_NS if number == 5 else 0))
-    text = "has 1 messages with the time of the message before (allowed: at most 0)"
+    text = "has 1 message with the time of the message before (allowed: at most 0)"
     assert found["/ego/motion: repeated_times"] == (Severity.ERROR, text)
     assert found["/camera/front/disparity: repeated_times"][0] is Severity.ERROR
 

@@ -238,7 +238,7 @@ def test_a_recovered_log_says_so_and_is_converted_again(tmp_path):
     path.write_bytes(flipped(data, chunks(data)[3].begin + 90))
     recover_log(path, tmp_path / "out.mcap")
     (first,) = [finding for finding in check_log(tmp_path / "out.mcap").findings if finding.place == "file"]
-    assert f"was recovered from a damaged log, of which {lost} messages are lost" in first.message
+    assert f"was recovered from a damaged log, which lost {lost} messages" in first.message
     path.write_bytes((tmp_path / "out.mcap").read_bytes())
     assert convert_recordings([driving()], tmp_path).written == ["val/street"]
     assert path.read_bytes() == data

@@ -36,7 +36,7 @@ def test_each_limit_of_a_topic_is_held(field, limit, message):
 def test_repeated_times_are_told_instead_of_what_follows_from_them():
     expected = TopicContract(repeated_times=Range(high=0), gap_periods=Range(high=1.5))
     assert told(timing("/a", expected, {"/a": at(0, 0, 100, 900)}, "")) == [
-        ("/a: repeated_times", "has 1 messages with the time of the message before (allowed: at most 0)")
+        ("/a: repeated_times", "has 1 message with the time of the message before (allowed: at most 0)")
     ]
     assert told(timing("/a", TopicContract(rate_hz=Range(low=1)), {"/a": at(5, 5, 5)}, "")) == []
 

@@ -5,8 +5,18 @@ import torch
 from safetensors.torch import save_file
 from support.models import given, network
 
-from semgrid_eval.errors import InputError
-from semgrid_eval.models.checkpoint import load_weights, read_header, save_weights
+from semgrid_eval.errors import InputError, ResultError
+from semgrid_eval.models.checkpoint import (
+    CHECKPOINT_FILE,
+    HISTORY_FILE,
+    WEIGHTS_FILE,
+    EpochRecord,
+    TrainingFolder,
+    find_finished,
+    load_weights,
+    read_header,
+    save_weights,
+)
 from semgrid_eval.models.encoder_decoder import EncoderDecoder
 
 
@@ -53,3 +63,34 @@ def test_damaged_missing_or_foreign_files_are_named(tmp_path):
     wider = network(EncoderDecoder, given(inputs=4), depth=2, features=8)
     with pytest.raises(InputError, match=r"good\.safetensors: has no weights of this network"):
         load_weights(wider, good)
+
+
+def finished(folder, key):
+    folder.mkdir(parents=True)
+    TrainingFolder(folder, key).finish(small(), [EpochRecord(1, 2, 0.1, 0.5, None, 1.0)])
+
+
+def test_a_finished_training_is_found_by_its_key_under_any_name(tmp_path):
+    assert find_finished(tmp_path / "none", "mine") is None
+    finished(tmp_path / "a", "other")
+    finished(tmp_path / "b", "mine")
+    assert find_finished(tmp_path, "mine") == tmp_path / "b"
+    assert find_finished(tmp_path, "third") is None
+
+
+@pytest.mark.parametrize("file", [WEIGHTS_FILE, HISTORY_FILE])
+def test_a_training_that_is_damaged_or_not_finished_is_not_found(tmp_path, file):
+    finished(tmp_path / "a", "mine")
+    whole = (tmp_path / "a" / file).read_bytes()
+    (tmp_path / "a" / file).write_bytes(whole[:-3])
+    assert find_finished(tmp_path, "mine") is None
+    (tmp_path / "a" / file).unlink()
+    (tmp_path / "a" / CHECKPOINT_FILE).touch()
+    assert find_finished(tmp_path, "mine") is None
+
+
+def test_of_another_training_the_weights_are_not_read(tmp_path):
+    finished(tmp_path / "a", "other")
+    (tmp_path / "a" / WEIGHTS_FILE).write_bytes(b"damaged")
+    with pytest.raises(ResultError, match=r"history\.csv: belongs to another id \(other, not mine\)"):
+        TrainingFolder(tmp_path / "a", "mine").is_complete()

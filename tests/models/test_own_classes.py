@@ -101,7 +101,7 @@ def test_a_table_of_many_classes_looks_at_fewer_grids():
 def test_the_default_classes_are_not_part_of_what_a_training_is_known_by():
     row = Given(("full",), 2, 8, 8, 1.0, translate=True)
     assert set(row.described()) == {"sensors", "inputs", "rows", "columns", "cell_m", "translate"}
-    assert replace(row, classes=OWN).described()["classes"] == OWN.model_dump(mode="json")
+    assert replace(row, classes=OWN).described()["classes"] == OWN.identity()
     assert (row.planes, replace(row, classes=OWN).planes) == (20, 12)
 
 

@@ -48,7 +48,7 @@ def test_it_answers_by_name_with_scores_that_depend_on_the_lead(batch):
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [
-        ({"inputs": 3}, "was trained on 2 inputs of one sensor, not 1 sensors and 3 inputs"),
+        ({"inputs": 3}, "was trained on 2 inputs of one sensor, not 1 sensor and 3 inputs"),
         ({"sensors": ("a", "b")}, "not 2 sensors and 2 inputs"),
         ({"translate": False}, "was trained on inputs moved to the target's time"),
         ({"cell_m": 0.39}, "was trained on cells of 0.78125 m, not 0.39 m"),

@@ -109,7 +109,7 @@ def test_complete_training_is_read_and_not_repeated(tmp_path):
 
 def test_folder_of_another_training_is_refused(tmp_path):
     quick(tmp_path)
-    with pytest.raises(InputError, match=r"weights\.safetensors: belongs to another id"):
+    with pytest.raises(InputError, match=r"history\.csv: belongs to another id"):
         quick(tmp_path, seed=2)
     (tmp_path / WEIGHTS_FILE).unlink()
     with pytest.raises(KeyboardInterrupt):

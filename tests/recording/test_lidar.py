@@ -24,7 +24,7 @@ def test_points_that_cannot_be_are_refused(point, line):
 
 
 def test_labels_of_another_count_than_points_are_refused():
-    with pytest.raises(InputError, match=r"^has 1 labels for 2 points$"):
+    with pytest.raises(InputError, match=r"^has labels of 1 and places of 2 points$"):
         sweep(0, [(1.0, 2.0, 3.0)] * 2, ["car"])
 
 

@@ -51,7 +51,7 @@ def test_a_log_that_was_recovered_says_what_it_lost(logs, tmp_path):
     found.prepare()
     told = {path: record.recovered for path, record in found.records.items()}
     assert told["val/whole.mcap"] == ""
-    assert told["val/saved.mcap"].startswith("was recovered from a damaged log, of which ")
+    assert told["val/saved.mcap"].startswith("was recovered from a damaged log, which lost ")
 
 
 @NEEDS_PROC

@@ -24,6 +24,6 @@ def test_a_lead_has_to_be_as_many_frames_of_all_recordings():
     alone = at_rate("of one frame", 4, FRAME_NS, frames=1)
     assert wanted_lead(lead, stack_recordings([*alike, alone], cell_m=1.0)) == (2,), "it has no rate"
     other = at_rate("slow", 3, 100_000_000)
-    with pytest.raises(InputError, match="lead_ms: 120 ms are 1 frames of slow and 2 frames of a bit slower; score"):
+    with pytest.raises(InputError, match="lead_ms: 120 ms are 1 frame of slow and 2 frames of a bit slower; score"):
         wanted_lead(lead, stack_recordings([*alike, other], cell_m=1.0))
     assert wanted_lead(WindowConfig(), stack_recordings([*alike, other], cell_m=1.0)) == (), "steps are frames"

@@ -10,11 +10,13 @@ import torch
 import yaml
 from support.drawn_again import write_town_like
 from support.planned import planned
+from support.recordings import random_recording
 from support.small_runs import WINDOW, run, write_logs
 
 from semgrid_eval.executors import Processes
 from semgrid_eval.grids.draws import Draws
 from semgrid_eval.grids.recording import FORMAT_VERSION
+from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.grids.truth import TRUTH_VERSION
 from semgrid_eval.models.model import Given
 from semgrid_eval.models.network import Network
@@ -24,10 +26,11 @@ from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.plan import plan_run
 from semgrid_eval.runs.row import Row
 from semgrid_eval.runs.runner import RunOptions
-from semgrid_eval.runs.truth import told
+from semgrid_eval.runs.truth import parts_of, told
 from semgrid_eval.scores import results
 from semgrid_eval.scores.sums import EXPECTED_FILE, SUMS_FILE, read_sums
-from semgrid_eval.windows.data import WindowSet
+from semgrid_eval.windows.data import WindowSet, select_windows
+from semgrid_eval.windows.grids import stack_recordings
 
 TOLD = [{"name": "top", "model": "ceiling", "settings": {"draws": 5}}, {"name": "new", "model": "fresh"}]
 SAME = {"name": "same", "model": "fresh", "settings": {"seen_is_known": False}}
@@ -203,7 +206,6 @@ def test_no_network_and_no_baseline_asks_for_the_truth():
 def test_answers_stand_at_their_windows_whatever_the_order_of_logs(logs, tmp_path):
     from semgrid_eval.executors import InProcess
     from semgrid_eval.progress import silent_stage
-    from semgrid_eval.windows.data import select_windows
     from semgrid_eval.windows.plan import WindowConfig
 
     row = Row(name="x", model="newest", window=WindowConfig(step_frames=3, target_frame=8))
@@ -216,3 +218,22 @@ def test_answers_stand_at_their_windows_whatever_the_order_of_logs(logs, tmp_pat
     assert torch.equal(one[[2, 0, 1]], other)
     assert not torch.equal(one[0], one[1])
     assert replace(chosen[0], truth=one).batch(slice(1, 2)).truth.shape == (1, 10, 128, 128)
+
+
+def test_each_log_is_asked_once_of_all_its_windows_in_their_order():
+    """Two stretches of the log `a` lie on both sides of `b`, no window is of `c`, and windows come in any order."""
+    logs = ("a.mcap", "b.mcap", "a.mcap", "c.mcap")
+    recordings = [replace(random_recording(i, frames=9, size=8), log=log, digest=log) for i, log in enumerate(logs)]
+    data = stack_recordings(recordings, cell_m=1.0)
+    places = [(2, 5), (0, 8), (1, 4), (0, 3), (2, 7)]
+    found = planned(*((owner, (frame - 1,), frame) for owner, frame in places))
+    windows = select_windows(data, found, sensors=("full",))
+    parts = list(parts_of(Draws(2, continued=True), windows, GridConfig()))
+    assert [(str(part.question.log), part.windows.tolist()) for part in parts] == [
+        ("a.mcap", [0, 1, 3, 4]),
+        ("b.mcap", [2]),
+    ]
+    for part in parts:
+        assert part.question.digest == str(part.question.log)
+        expected = [data.stamps_ns[data.first_frames[places[i][0]] + places[i][1]] for i in part.windows]
+        assert part.question.times.target_ns.tolist() == expected

@@ -80,7 +80,7 @@ def test_logs_cameras_and_integrators_have_files_of_their_own(tmp_path):
         ("track", np.full((2, 3), np.nan), "track: has shape (2, 3), type float64, or is not finite"),
         ("projection", np.zeros((3, 3)), "projection: has shape (3, 3)"),
         ("start_ns", np.array([1, 2]), "start_ns: has shape (2,), type int64"),
-        ("stamps_ns", np.array([1, 2]), "2 frames have 3 images and 3 labels"),
+        ("stamps_ns", np.array([1, 2]), "frames: 2, images: 3, labels: 3"),
         ("faults", np.array([1]), "faults: has shape (1,), type int64"),
         ("stamps_ns", np.array([[1, 2, 3]]), "stamps_ns: has shape (1, 3), type int64"),
     ],

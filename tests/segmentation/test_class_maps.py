@@ -94,7 +94,7 @@ def test_base_gives_what_is_not_named(own):
     ("text", "told"),
     [
         ("classes: {street: rode, wheels: car}", "classes.street: 'rode' is not one of .*; did you mean road"),
-        ("classes: {street: road}", "classes: has 1 classes; 2 to 255 are possible"),
+        ("classes: {street: road}", "classes: has 1 class; 2 to 255 are possible"),
         ('classes: {"0": road, "2": car}', "classes: index 1 is missing"),
         ('classes: {"00": road, "1": car}', "classes: '00' is a name beside indices"),
         ('classes: {"0": road, wheels: car}', "classes: 'wheels' is a name beside indices"),

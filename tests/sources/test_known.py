@@ -61,7 +61,7 @@ def test_a_source_in_the_table_is_a_command_with_the_options_of_its_fields(bags)
     assert done.output.endswith("logs: 3 written, 0 up to date, 0 failed\n")
     with LogReader(find_logs(Path("logs"))[0]) as log:
         assert (log.scene.name, log.scene.dataset, log.scene.group) == ("drive0", "ros1", "drive")
-    assert convert("bags", "drive", "logs").output.splitlines()[-1].startswith("Warning: logs holds 1 logs that do not")
+    assert convert("bags", "drive", "logs").output.splitlines()[-1].startswith("Warning: logs holds 1 log beside those")
 
 
 def test_limits_of_its_fields_are_checked(bags):

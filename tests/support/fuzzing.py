@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from support.fuzzing_bags import bag_inputs, read_bag
+from support.fuzzing_clouds import changed_clouds, cloud_inputs, read_clouds
 from support.fuzzing_logs import log_agrees, log_inputs, read_log, recovered, recovery_agrees, resealed
 from support.fuzzing_pictures import all_png_inputs, png_inputs, read_png, resealed_png
 from support.fuzzing_texts import json_inputs, read_of_kind, yaml_inputs
@@ -46,5 +47,6 @@ KINDS: dict[str, Kind] = {
     "json": Kind(json_inputs, read_of_kind, words, has_checksums=False),
     "yaml": Kind(yaml_inputs, read_of_kind, words, has_checksums=False),
     "bag": Kind(bag_inputs, read_bag, anyhow, has_checksums=False),
+    "cloud": Kind(cloud_inputs, read_clouds, changed_clouds, has_checksums=False),
     **{kind: _kept(kind) for kind in KEPT},
 }

@@ -46,3 +46,5 @@ def test_the_figures_of_the_page_are_those_that_are_kept(tmp_path):
     said = call("--drawn", docs / "cost.json", "--out", tmp_path)
     page = (docs / "performance.md").read_text()
     assert [line for line in said.splitlines() if line and line not in page] == []
+    assert not re.search(r"e[+-][0-9]", said), "hours are written out"
+    assert re.search(r"^\| `paper` \| [0-9]+ \| [0-9],[0-9]{3} h \|", said, re.MULTILINE)

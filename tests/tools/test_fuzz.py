@@ -26,6 +26,7 @@ COUNTS = {
     "json": 200,
     "yaml": 60,
     "bag": 40,
+    "cloud": 40,
 }
 
 

@@ -42,7 +42,7 @@ def test_recordings_take_one_lead_after_the_other_also_where_every_target_counts
     assert by_recording[1] == [(1, (target - 2,), target) for target in (2, 3)]
     assert by_recording[2] == [(2, (target - 1,), target) for target in (1, 2, 3)]
     assert by_recording[3] == [(3, (0,), 1)]  # too short for the lead whose turn it is
-    assert plan.too_short == {4: "has 1 frames, and a window needs 2"}
+    assert plan.too_short == {4: "has 1 frame, and a window needs 2"}
 
 
 def test_short_recordings_are_named_and_the_others_go_on():
@@ -54,9 +54,9 @@ def test_short_recordings_are_named_and_the_others_go_on():
 
 @pytest.mark.parametrize("plan", [training_windows, validation_windows])
 def test_no_window_at_all_is_an_error_with_both_numbers(plan):
-    with pytest.raises(InputError, match=r"a window needs \d+ frames, and the longest of 2 recordings has 10"):
+    with pytest.raises(InputError, match=r"a window needs \d+ frames, and the longest recording \(of 2\) has 10"):
         plan([9, 10], WindowConfig())
-    with pytest.raises(InputError, match="the longest of 0 recordings has 0"):
+    with pytest.raises(InputError, match=r"the longest recording \(of 0\) has 0"):
         plan([], WindowConfig())
 
 

@@ -3,6 +3,7 @@
 import errno
 import os
 import pickle
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -67,6 +68,22 @@ def test_what_is_not_asked_for_is_never_read(on_disk, reads, tmp_path):
     for _ in range(2):
         windows.actors(slice(0, 4))
     assert reads == [("random 0", "actors.0")], "flags of recordings with a target that is scored, and once"
+
+
+@pytest.mark.parametrize("folder", [None, "cache"])
+def test_how_far_grids_are_gathered_is_shown_when_they_are_asked_for(on_disk, tmp_path, folder):
+    said = []
+
+    @contextmanager
+    def stage(label):
+        yield lambda done, total, message="": said.append((label, done, total, message))
+
+    storage = Storage(CPU, folder and tmp_path / folder, stage)
+    data = stack_recordings(on_disk, cell_m=0.5, storage=storage)
+    assert said == []
+    for _ in range(2):
+        assert data.grids.shape[0] == len(SENSORS)
+    assert said == [("gather", done, 3, f"random {done - 1}") for done in (1, 2, 3)]
 
 
 @NEEDS_PROC

@@ -187,7 +187,7 @@ def on_cityscapes(run: Run) -> bool:
 
 def has_papers_classes(run: Run) -> bool:
     """Tell whether a run's grids have the paper's classes, which its claims and values are about."""
-    return all(row.classes == DEFAULT_CLASSES for row in run.rows)
+    return all(row.classes.means(DEFAULT_CLASSES) for row in run.rows)
 
 
 def in_paper(name: str) -> bool:
@@ -197,7 +197,7 @@ def in_paper(name: str) -> bool:
 
 def is_papers(row: Row) -> bool:
     """Tell whether the paper has a row of that name, and of the same classes."""
-    return row.classes == DEFAULT_CLASSES and in_paper(row.record.name)
+    return row.classes.means(DEFAULT_CLASSES) and in_paper(row.record.name)
 
 
 def paper_value(row: Row, column: str) -> float:

@@ -220,18 +220,20 @@ def score_all(rows: Sequence[Row], divisions: Sequence[Division], resampling: Re
 def classes_of(rows: Iterable[Row]) -> ClassSet:
     """Return the classes of rows that are scored side by side; the default ones where no row has a result.
 
+    Where their colours are different, those of the first row count.
+
     Raises:
         InputError: they have different ones, so that their figures have nothing in common.
     """
-    known: dict[ClassSet, Row] = {}
-    for row in rows:
-        if row.results:
-            known.setdefault(row.classes, row)
-    if len(known) > 1:
-        first, second, *_ = known.values()
-        fault = f"row {second.name} has other classes than {first.name} of {first.run}: report them apart"
-        raise InputError(fault, path=second.run, field="grid.classes")
-    return next(iter(known), DEFAULT_CLASSES)
+    known = [row for row in rows if row.results]
+    if not known:
+        return DEFAULT_CLASSES
+    first = known[0]
+    for other in known:
+        if not other.classes.means(first.classes):
+            fault = f"row {other.name} has other classes than {first.name} of {first.run}: report them apart"
+            raise InputError(fault, path=other.run, field="grid.classes")
+    return first.classes
 
 
 def shared_iou(entries: Iterable[RowScores]) -> Iou:

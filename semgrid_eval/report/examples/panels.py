@@ -10,8 +10,9 @@ from semgrid_eval.report.examples import drawing
 from semgrid_eval.report.examples.choose import Contest, Pick, by_window, mean_iou
 from semgrid_eval.report.examples.thumbnails import Crop, RunThumbnails, View, times
 from semgrid_eval.report.rows.load import Row, WindowReader, key_of
-from semgrid_eval.report.tables.numbers import ABSENT, number, plural, signed
+from semgrid_eval.report.tables.numbers import ABSENT, number, signed
 from semgrid_eval.scores.results import WindowRecord, read_predictions, read_windows
+from semgrid_eval.words import plural
 
 _FEWEST_COLUMNS, _MOST_COLUMNS = 4, 6
 _TARGET = ("Target", "Target grid with mask M in white")

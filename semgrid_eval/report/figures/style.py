@@ -22,7 +22,7 @@ from semgrid_eval.errors import printable
 from semgrid_eval.report.claims.claims import is_papers
 from semgrid_eval.report.estimates.bootstrap import Scores
 from semgrid_eval.report.rows.load import Row
-from semgrid_eval.report.tables.numbers import plural
+from semgrid_eval.words import plural
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart.
 PALETTE = ("#e69f00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")

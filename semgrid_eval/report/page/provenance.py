@@ -13,10 +13,10 @@ import yaml
 from semgrid_eval.files import digest_value
 from semgrid_eval.report.claims.claims import scaling
 from semgrid_eval.report.rows.load import Row, Run
-from semgrid_eval.report.tables.numbers import plural
 from semgrid_eval.report.tables.table import Cell, Line, Table, plain_table
 from semgrid_eval.scores.results import NOT_RUN, LogRecord, ResultRecord, RunRecord
 from semgrid_eval.sources.benchmarks import FINGERPRINT_CHARACTERS, published_fingerprints
+from semgrid_eval.words import plural
 
 
 @dataclass(frozen=True)

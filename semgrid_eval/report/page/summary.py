@@ -12,10 +12,11 @@ from semgrid_eval.report.estimates.streams import Strategy
 from semgrid_eval.report.rows.load import Row, Run, comparable, key_of
 from semgrid_eval.report.rows.pairing import HEADLINE, VERDICTS, Headline, verdict
 from semgrid_eval.report.rows.words import otherwise_asked, question_words
-from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, plural, signed
+from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase, number, signed
 from semgrid_eval.report.tables.streams import stream_sentence
 from semgrid_eval.report.tables.targets import fusion_sentence, not_compared_sentence
 from semgrid_eval.report.tables.truth import way_sentence
+from semgrid_eval.words import plural
 
 _FEW_RECORDINGS, _FEW_SEEDS = 10, 5
 _UNSURE = "may be chance"

@@ -112,7 +112,7 @@ def _frame(material: Material) -> dict[str, Any]:
         "script": Markup().join(map(_source, ("page.js", "chooser.js", "examples.js", "reel.js", "colours.js"))),
         "version": __version__,
         "runs": material.runs,
-        "own_classes": material.classes != DEFAULT_CLASSES,
+        "own_classes": not material.classes.means(DEFAULT_CLASSES),
         "title": title_of(material.runs),
         "axes": chooser_axes(material.runs),
         "names": {row.number: row.name for run in material.runs for row in run.rows if row.results},

@@ -201,7 +201,7 @@ def load_runs(folders: Sequence[Path], *, progress: Progress = silent) -> tuple[
     records = [files.read_run(folder) for folder in folders]
     total, done, runs = sum(len(record.rows) for record in records), count(1), []
     for folder, tag, record in zip(folders, _tags(folders), records, strict=True):
-        rows, load = [], _Loader(folder, {log.path: log.group for log in record.logs})
+        rows, load = [], _Loader(folder, record)
         for row in record.rows:
             rows.append(load.row(row, f"{row.name} ({tag})" if tag else row.name, number := next(done)))
             progress(number, total, row.name)
@@ -268,8 +268,9 @@ def _tags(folders: Sequence[Path]) -> list[str]:
 class _Loader:
     """Reads the rows of one run; results that have the same windows share the records of them."""
 
-    def __init__(self, run: Path, groups: Mapping[str, str]) -> None:
-        self._run, self._groups = run, groups
+    def __init__(self, run: Path, record: files.RunRecord) -> None:
+        self._run, self._record = run, record
+        self._groups = {log.path: log.group for log in record.logs}
         self._windows: dict[tuple[files.WindowRecord, ...], tuple[files.WindowRecord, ...]] = {}
 
     def row(self, row: files.RowRecord, name: str, number: int) -> Row:
@@ -288,7 +289,7 @@ class _Loader:
         return Row(name, row, tuple(found), tuple(failures), self._run, self._groups, tuple(faults), number)
 
     def _result(self, folder: Path) -> Result:
-        record = files.read_result(folder)
+        record = self._record.shown(files.read_result(folder))
         windows = self._windows.setdefault(record.windows, record.windows)
         check_sums(folder, len(windows), record.classes, has_expected=record.has_expected)
         shared = record.model_copy(update={"windows": windows})

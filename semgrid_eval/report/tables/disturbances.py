@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, shared_iou
 from semgrid_eval.report.rows.load import Row, comparable
 from semgrid_eval.report.rows.pairing import settings_of
-from semgrid_eval.report.tables.numbers import interval_phrase, plural
+from semgrid_eval.report.tables.numbers import interval_phrase
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
 from semgrid_eval.report.tables.values import evidence
+from semgrid_eval.words import plural
 
 _CAPTION = (
     "What disturbed inputs cost: the score of each model with its inputs as they are, and below it what it loses where "

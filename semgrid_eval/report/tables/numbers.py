@@ -35,11 +35,6 @@ def interval_phrase(estimate: Estimate, *, with_sign: bool = False) -> str:
     return f"{LEVEL:.0%} interval {text}" if text else "no interval"
 
 
-def plural(count: int, noun: str) -> str:
-    """Write a count with its noun."""
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
-
-
 def finite(value: float) -> float | None:
     """Return a value, None where it is absent."""
     return value if math.isfinite(value) else None

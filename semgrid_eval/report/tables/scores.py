@@ -15,13 +15,14 @@ from semgrid_eval.report.rows.pairing import (
     settings_of,
 )
 from semgrid_eval.report.tables.disturbances import disturbance_table
-from semgrid_eval.report.tables.numbers import ABSENT, MINUS, interval_phrase, number, plural
+from semgrid_eval.report.tables.numbers import ABSENT, MINUS, interval_phrase, number
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, plain_table
 from semgrid_eval.report.tables.targets import not_compared_table
 from semgrid_eval.report.tables.values import difference_table, run_differences, side_by_side, value_table
 from semgrid_eval.scores.metrics.iou import Iou
 from semgrid_eval.scores.metrics.metric import Metric, divided
 from semgrid_eval.scores.metrics.table import IOU, metrics_of
+from semgrid_eval.words import plural
 
 _PAPER = (
     " The paper's values (Table A1) come from Cityscapes' validation set; "

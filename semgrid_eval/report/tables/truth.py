@@ -7,9 +7,10 @@ from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, shared_io
 from semgrid_eval.report.estimates.way import Order, Way, ways
 from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.rows.pairing import HEADLINE, verdict
-from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, plural
+from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number
 from semgrid_eval.report.tables.table import Cell, Line, Table
 from semgrid_eval.report.tables.values import value_table
+from semgrid_eval.words import plural
 
 _MOST_PAIRS = 4
 _WAY = (

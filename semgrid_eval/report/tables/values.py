@@ -10,9 +10,10 @@ from semgrid_eval.report.claims.claims import paper_table
 from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores
 from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.rows.pairing import reference_of, verdict
-from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, plural, signed
+from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, signed
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, value_cell
 from semgrid_eval.scores.metrics.metric import column_of
+from semgrid_eval.words import plural
 
 _OTHER_TARGETS = " Rows whose targets differ (frames, grids, mask mode or split) are not compared with each other."
 

@@ -11,6 +11,7 @@ from semgrid_eval.files import read_bytes
 from semgrid_eval.geometry import SE3
 from semgrid_eval.recording.lidar import MAX_POINTS
 from semgrid_eval.sources.kitti.labels import classes_of, label_ids
+from semgrid_eval.words import plural
 
 MAX_FILE_BYTES = 1 << 28
 _MAX_TIME_S = 1e9
@@ -66,7 +67,7 @@ def read_points(path: Path) -> NDArray[np.float32]:
     """Read `velodyne/*.bin`: (N, 4) x, y, z in metres (forward, left, up) and reflectance."""
     data = read_file(path)
     if len(data) % _POINT_BYTES or len(data) // _POINT_BYTES > MAX_POINTS:
-        fault = f"has {len(data)} bytes, which are not points of {_POINT_BYTES} bytes, at most {MAX_POINTS}"
+        fault = f"has {plural(len(data), 'byte')}, which are not points of {_POINT_BYTES} bytes, at most {MAX_POINTS}"
         raise InputError(fault, path=path)
     return np.frombuffer(data, "<f4").reshape(-1, 4)
 
@@ -75,7 +76,7 @@ def read_labels(path: Path) -> NDArray[np.uint8]:
     """Read `labels/*.label`, class and instance of each point, as Cityscapes label ids: (N,)."""
     data = read_file(path)
     if len(data) % _LABEL_BYTES:
-        raise InputError(f"has {len(data)} bytes, which are not labels of {_LABEL_BYTES} bytes", path=path)
+        raise InputError(f"has {plural(len(data), 'byte')}, which are not labels of {_LABEL_BYTES} bytes", path=path)
     classes = classes_of(np.frombuffer(data, "<u4"))
     with located(path=path):
         return label_ids(classes)
@@ -99,7 +100,7 @@ def _numbers(text: str, count: int, path: Path, place: str) -> Floats:
     """Read so many finite numbers."""
     words = text.split()
     if len(words) != count:
-        raise InputError(f"has {len(words)} numbers; {count} are needed", path=path, field=place)
+        raise InputError(f"has {plural(len(words), 'number')}; {count} are needed", path=path, field=place)
     try:
         found = np.array([float(word) for word in words])
     except ValueError as error:

@@ -13,6 +13,7 @@ from semgrid_eval.recording.types import CameraCalibration, Moment, Pose, Record
 from semgrid_eval.sources.kitti import files
 from semgrid_eval.sources.kitti.stereo import StereoPairs, calibration_of
 from semgrid_eval.sources.poses import motion_of, planar
+from semgrid_eval.words import plural
 
 DATASET = "kitti"
 CAMERA, LIDAR = "left", "top"
@@ -147,7 +148,10 @@ class Part:
         points = files.read_points(scan)
         labels = files.read_labels(label_file) if "labels" in sequence.channels else None
         if labels is not None and len(labels) != len(points):
-            raise InputError(f"has {len(labels)} labels, but {scan.name} has {len(points)} points", path=label_file)
+            raise InputError(
+                f"has {plural(len(labels), 'label')}, but {scan.name} has {plural(len(points), 'point')}",
+                path=label_file,
+            )
         camera_from_lidar = sequence.calibration.camera_from_lidar
         if camera_from_lidar is None:
             raise InputError("is missing", path=sequence.folder / "calib.txt", field="Tr")

@@ -1,5 +1,6 @@
 """Point clouds in messages: their fields by name, as columns of one row a point."""
 
+from collections import Counter
 from collections.abc import Iterable
 from typing import Any, Literal, NamedTuple
 
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from semgrid_eval.errors import InputError
 from semgrid_eval.recording.lidar import MAX_POINTS
 from semgrid_eval.sources.ros2.mapping import LidarMap
+from semgrid_eval.words import plural
 
 PLACE = ("x", "y", "z")
 INTENSITY = "intensity"
@@ -17,6 +19,8 @@ _TYPES = dict(enumerate(("int8", "uint8", "int16", "uint16", "int32", "uint32", 
 """Names of numbers by what a PointField calls them."""
 NUMBERS, WHOLE = tuple(_TYPES.values()), ("int8", "uint8", "int16", "uint16", "int32", "uint32")
 _REAL = ("float32", "float64")
+_NOT_A_NUMBER = np.errstate(invalid="ignore")
+"""Numpy warns of those bit patterns that are signalling; all are left out, whichever they are."""
 
 
 def type_of(field: Any) -> str:  # noqa: ANN401 - a class that rosbags makes
@@ -49,9 +53,12 @@ def require_layout(message: Any, extras: Extras) -> None:  # noqa: ANN401
         InputError: it has not.
     """
     fields = {field.name: field for field in message.fields}
+    counts = Counter(field.name for field in message.fields)
     for name, types in _read_fields(extras, fields).items():
         if name not in fields:
             raise InputError(f"has no field {name}; there are: {', '.join(fields) or 'none'}")
+        if counts[name] > 1:
+            raise InputError(f"has {counts[name]} fields {name}")
         if type_of(fields[name]) not in types:
             raise InputError(f"{name} is {type_of(fields[name])}; it is read from {', '.join(types)}")
         if fields[name].offset + np.dtype(type_of(fields[name])).itemsize > message.point_step:
@@ -82,6 +89,7 @@ def columns_of(message: Any, extras: Extras) -> NDArray[np.void]:  # noqa: ANN40
     return points
 
 
+@_NOT_A_NUMBER
 def returned(points: NDArray[np.void]) -> NDArray[np.bool_]:
     """Return which points are of something that sent light back: (N,)."""
     place_m = np.stack([points[axis] for axis in PLACE], axis=1)
@@ -89,6 +97,7 @@ def returned(points: NDArray[np.void]) -> NDArray[np.bool_]:
     return found
 
 
+@_NOT_A_NUMBER
 def times_of(points: NDArray[np.void], name: str) -> NDArray[np.float64]:
     """Return the times of points that count, as they are written: those that are finite of points that came back."""
     values = points[name][returned(points)].astype(np.float64)
@@ -116,7 +125,9 @@ def _require_size(message: Any) -> None:  # noqa: ANN401
         raise InputError(f"has points of {message.point_step} bytes; at most {MAX_POINT_BYTES} are allowed")
     row_bytes = message.width * message.point_step
     if message.row_step < row_bytes:
-        raise InputError(f"row_step {message.row_step} is less than {message.width} points of {message.point_step}")
+        raise InputError(
+            f"row_step {message.row_step} is less than {plural(message.width, 'point')} of {message.point_step}"
+        )
     if len(message.data) != message.row_step * message.height:
-        told = f"{message.height} rows of {message.row_step}"
-        raise InputError(f"has {len(message.data)} bytes, which are not {told}")
+        told = f"{plural(message.height, 'row')} of {message.row_step}"
+        raise InputError(f"has {plural(len(message.data), 'byte')}, which are not {told}")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_eval.labels import LAST_LABEL_ID
 from semgrid_eval.sources.kitti.labels import CLASSES, classes_of
 from semgrid_eval.sources.ros2.clouds import NUMBERS, WHOLE, Extras, columns_of, times_of, type_of
 from semgrid_eval.sources.ros2.labels import likely_ids
@@ -17,7 +18,6 @@ _TIME_NAMES = ("t", "time", "timestamp", "time_stamp", "time_offset", "offset_ti
 _LABEL_NAMES = ("label", "labels", "label_id", "class", "class_id", "semantic", "objtag")
 _EPOCH_S = 1e8
 """No offset is so long, and no clock since 1970 shows less."""
-_LAST_LABEL_ID = 33
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,6 @@ def _times(points: NDArray[np.void], name: str) -> TimesSeen:
 
 def _ids(ids: Any) -> str:  # noqa: ANN401 - an array (N,) of whole numbers
     highest = int(ids.max(initial=0))
-    if highest > _LAST_LABEL_ID and np.isin(classes_of(ids), list(CLASSES)).all():
+    if highest > LAST_LABEL_ID and np.isin(classes_of(ids), list(CLASSES)).all():
         return "semantickitti"
     return likely_ids(highest)

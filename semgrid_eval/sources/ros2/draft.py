@@ -1,7 +1,10 @@
 """A first map file, guessed from types and names, with comments on what was guessed."""
 
+import json
+import re
 from collections.abc import Iterator
 
+from semgrid_eval.errors import printable
 from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.contents import Contents
 from semgrid_eval.sources.ros2.draft_cameras import draft_cameras
@@ -16,7 +19,7 @@ def draft_map(contents: Contents) -> str:
     lines = [
         "# Which topics of a bag are what; docs/own-car.md says what else can stand here.",
         "vehicle:",
-        f"  frame: {vehicle}  # x ahead, y left, z up",
+        f"  frame: {_written(vehicle)}  # x ahead, y left, z up",
         "  height_m: 0.0  # of its origin above the ground",
         "  rear_axle_m: 0.0  # how far its origin lies ahead of the rear axle",
         *(["clock: received  # header stamps are all zero"] if contents.unstamped else []),
@@ -24,7 +27,12 @@ def draft_map(contents: Contents) -> str:
         *draft_cameras(contents, vehicle),
         *draft_lidars(contents, vehicle),
     ]
-    return "\n".join(lines) + "\n"
+    return "".join(f"{printable(line)}\n" for line in lines)  # names in comments may be anything
+
+
+def _written(name: str) -> str:
+    """Write a name as YAML takes it: in quotes where it is not a plain one."""
+    return name if re.fullmatch(r"[A-Za-z_/][\w/.-]*", name) else json.dumps(name)
 
 
 def _vehicle_frame(contents: Contents) -> str:

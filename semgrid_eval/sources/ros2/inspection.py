@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 
+from semgrid_eval.errors import printable
 from semgrid_eval.files import atomic_file
 from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.contents import Contents, Seen, look_at
@@ -35,7 +36,7 @@ def inspect_bags(paths: Sequence[Path], map_file: Path) -> str:
 def _table(contents: Contents) -> str:
     """Return a line for each topic: type, messages, rate, how late they were recorded, and what else is to say."""
     head = ("topic", "type", "messages", "Hz", "late ms", "")
-    rows = [head, *(_row(name, seen) for name, seen in contents.topics.items())]
+    rows = [head, *(tuple(map(printable, _row(name, seen))) for name, seen in contents.topics.items())]
     widths = [max(len(row[column]) for row in rows) for column in range(len(head))]
     lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)
     return "\n".join(lines)

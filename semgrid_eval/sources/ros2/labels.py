@@ -4,11 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.labels import CITYSCAPES_LABELS, LABEL_ID
+from semgrid_eval.labels import CITYSCAPES_LABELS, LABEL_ID, LAST_TRAIN_ID, NO_TRAIN_ID
 from semgrid_eval.sources.kitti.labels import CLASSES
 from semgrid_eval.sources.ros2.mapping import HIGHEST_PIXEL, Ids
-
-_LAST_TRAIN_ID, _NO_TRAIN_ID = 18, 255
 
 
 class LabelTable:
@@ -37,7 +35,7 @@ class LabelTable:
 
 def likely_ids(highest: int) -> str:
     """Guess by the highest of some ids which of Cityscapes' kinds they are."""
-    return "train_ids" if highest <= _LAST_TRAIN_ID else "label_ids"
+    return "train_ids" if highest <= LAST_TRAIN_ID else "label_ids"
 
 
 def _unknown(label: int) -> InputError:
@@ -52,5 +50,5 @@ def _given(ids: str | Ids) -> Ids:
         return {name: tuple(number for number, (_, label) in CLASSES.items() if label == name) for name in names}
     if ids == "label_ids":
         return {label.name: (label.label_id,) for label in CITYSCAPES_LABELS}
-    trained = {label.name: (label.train_id,) for label in CITYSCAPES_LABELS if label.train_id != _NO_TRAIN_ID}
-    return {**trained, "unlabeled": (_NO_TRAIN_ID,)}
+    trained = {label.name: (label.train_id,) for label in CITYSCAPES_LABELS if label.train_id != NO_TRAIN_ID}
+    return {**trained, "unlabeled": (NO_TRAIN_ID,)}

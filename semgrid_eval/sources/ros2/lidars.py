@@ -88,11 +88,10 @@ class Sweeps:
         if is_empty(message):
             return self._empty(stamp_ns)
         points = columns_of(message, Extras.of(self._lidar))
+        points = points[returned(points)]
         place_m = np.stack([points[axis] for axis in PLACE], axis=1).astype(np.float64)
-        came_back = returned(points)
-        points = points[came_back]
         with np.errstate(over="ignore", invalid="ignore"):  # what is too large then is refused
-            moved_m = self._at_stamp(place_m[came_back], points, stamp_ns).astype(np.float32)
+            moved_m = self._at_stamp(place_m, points, stamp_ns).astype(np.float32)
             intensity = _intensity(points)
         return LidarSweep(stamp_ns, self._mount, moved_m, intensity, self._label_id(points))
 

@@ -13,6 +13,7 @@ from semgrid_eval.sources.poses import speeds_mps, yaw_rates_radps
 from semgrid_eval.sources.ros2.kinds import IMU, ODOMETRY
 from semgrid_eval.sources.ros2.mapping import MotionMap
 from semgrid_eval.sources.ros2.transforms import rotation_of
+from semgrid_eval.words import plural
 
 Floats = NDArray[np.float64]
 
@@ -101,7 +102,9 @@ def _yaw_rate(by: str, track: Track, imu_turn: Floats | None) -> tuple[NDArray[n
 
 def _enough(track: Track) -> tuple[NDArray[np.int64], Floats]:
     if len(set(track.stamps_ns)) < 2:
-        raise InputError(f"has {len(set(track.stamps_ns))} samples of the motion; 2 are needed", field=track.topic)
+        raise InputError(
+            f"has {plural(len(set(track.stamps_ns)), 'sample')} of the motion; 2 are needed", field=track.topic
+        )
     return track.sorted()
 
 

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from semgrid_eval.config import Config
 from semgrid_eval.sources.benchmarks import RigName, SizeName, Stereo
+from semgrid_eval.words import plural
 
 CACHE = ".towns"
 """Folder of towns beside logs."""
@@ -63,7 +64,7 @@ class SyntheticConfig(Config):
         from semgrid_eval.sources.town.drives import needed_s  # here, as it is heavy
 
         if (longest_s := needed_s(self.frames)) > self.duration_s:
-            least = f"a drive of {self.frames} frames needs a town of {math.ceil(longest_s)} s or more"
+            least = f"a drive of {plural(self.frames, 'frame')} needs a town of {math.ceil(longest_s)} s or more"
             raise ValueError(f"{least}, not {self.duration_s:g} s: ask for a longer duration_s or fewer frames")
         return self
 

@@ -11,6 +11,7 @@ from semgrid_eval.geometry import Floats
 from semgrid_eval.sources.town.config import FRAME_COUNT
 from semgrid_eval.sources.town.simulation import STEP_S
 from semgrid_eval.sources.town.traffic import CAR_TYPES, Traffic
+from semgrid_eval.words import plural
 
 FRONT_TO_REAR_AXLE_M = 3.8
 SMOOTHING_S = 0.25
@@ -159,7 +160,7 @@ def choose_drives(traffic: Traffic, count: int, rng: np.random.Generator, frames
             index = _closest(speeds, free, target_mps, rng)
             if index is None:
                 raise InputError(
-                    f"the town's traffic holds only {len(chosen)} of {count} windows of {frames} frames; "
+                    f"the town's traffic holds only {len(chosen)} of {count} windows of {plural(frames, 'frame')}; "
                     "ask for fewer recordings, more towns, a larger town or a longer time"
                 )
             free[index] = False

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.windows.disturb.disturbance import Disturbance, Inputs
+from semgrid_eval.words import plural
 
 
 class LostFrame(Disturbance):
@@ -27,7 +28,9 @@ class LostFrame(Disturbance):
     def check(self, inputs: int, sensors: tuple[str, ...]) -> None:
         """Refuse to lose more than there is."""
         if self.strength > inputs:
-            raise ValueError(f"disturb.strength: {self.strength} frames cannot be lost of {inputs} inputs")
+            raise ValueError(
+                f"disturb.strength: {plural(self.strength, 'frame')} cannot be lost of {plural(inputs, 'input')}"
+            )
 
     def apply(self, inputs: Inputs) -> Inputs:
         """Make the chosen inputs unknown."""

@@ -139,7 +139,7 @@ FAULTS = {
     "sweep without labels": (lambda s: (s / "labels/000002.label").unlink(), "labels/000002.label: is missing"),
     "other count": (
         lambda s: cut(s / "labels/000001.label", 4),
-        "labels/000001.label: has 1 labels, but 000001.bin has 2 points",
+        "labels/000001.label: has 1 label, but 000001.bin has 2 points",
     ),
     "part of a label": (
         lambda s: cut(s / "labels/000001.label", 6),

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from support.ros_messages import cloud
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.sources.ros2.clouds import Extras, columns_of
+from semgrid_eval.sources.ros2.clouds import Extras, columns_of, returned, times_of
 
 READ = Extras(label="label", time="t")
 TYPES = [("t", "u4"), ("x", "f4"), ("pad", "u1"), ("y", "f4"), ("z", "f4"), ("label", "u2"), ("ring", "u1")]
@@ -53,6 +53,7 @@ FAULTS = {
     "no label": (renamed(WHOLE, "label", name="rgb"), "has no field label; there are: t, x, pad, y, z, rgb, ring"),
     "no time": (renamed(WHOLE, "t", name="time"), "has no field t; there are: time, x, pad, y, z, label, ring"),
     "no fields": (replace(WHOLE, fields=[]), "has no field x; there are: none"),
+    "two of a name": (renamed(WHOLE, "pad", name="z"), "has 2 fields z"),
     "whole place": (renamed(WHOLE, "z", datatype=5), "z is int32; it is read from float32, float64"),
     "real label": (
         renamed(WHOLE, "label", datatype=7),
@@ -63,7 +64,7 @@ FAULTS = {
     "beyond": (renamed(WHOLE, "z", offset=17), "z begins at byte 17 and reaches beyond a point of 20 bytes"),
     "short rows": (replace(WHOLE, row_step=59), "row_step 59 is less than 3 points of 20"),
     "cut": (replace(WHOLE, data=WHOLE.data[:-1]), "has 119 bytes, which are not 2 rows of 60"),
-    "long": (replace(WHOLE, height=1), "has 120 bytes, which are not 1 rows of 60"),
+    "long": (replace(WHOLE, height=1), "has 120 bytes, which are not 1 row of 60"),
     "huge": (replace(WHOLE, width=2**31), "has 2147483648 x 2 points; at most 4194304 are allowed"),
     "wide": (replace(WHOLE, point_step=2**31), "has points of 2147483648 bytes; at most 1024 are allowed"),
 }
@@ -93,3 +94,12 @@ def test_whatever_a_cloud_says_of_its_size_there_are_points_or_a_line(width, hei
 def test_whatever_a_cloud_says_of_its_fields_there_are_points_or_a_line(name, offset, datatype, count):
     with suppress(InputError):
         assert len(columns_of(renamed(WHOLE, name, offset=offset, datatype=datatype, count=count), READ)) == 6
+
+
+@pytest.mark.filterwarnings("error")
+def test_points_that_are_signalling_nan_did_not_come_back_and_nothing_warns():
+    found = columns_of(cloud(1, points(types=[(name, "f4") for name, _ in TYPES])), Extras(time="t"))
+    for name in ("x", "t"):
+        found[name].view("u4")[2:4] = 0x7F800001
+    assert returned(found).tolist() == [True, True, False, False, True, True]
+    assert times_of(found, "t").tolist() == [0, 1, 4, 5]

@@ -145,3 +145,20 @@ def test_a_cloud_that_cannot_be_read_is_told_and_not_drafted(tmp_path):
     assert "has no field x; there are: range" in said
     assert "has no field x; there are: none" in said
     assert "lidars:" not in text
+
+
+def test_names_in_a_bag_can_neither_move_a_cursor_nor_add_to_the_map(tmp_path):
+    """A field that clears a screen, a frame of two lines, and a vehicle whose frame is no plain word."""
+    odd = cloud(START_NS, np.zeros(2, [(name, "f4") for name in "xyz"]), frame="top\ncameras: [")
+    odd.fields.append(replace(odd.fields[0], name="\x1b[2J"))
+    messages = [each._replace(message=odd) if "points" in each.topic else each for each in RigBag(RECORDING).messages()]
+    for each in messages:
+        if each.topic == "/odom":
+            each.message.child_frame_id = "a: b"
+    links = [each for each in messages if each.topic != "/tf_static"]
+    said, text = inspected(tmp_path, links)
+    assert "x, y, z, \\x1b[2J float32" in said
+    told = yaml.safe_load(text)
+    assert told["vehicle"]["frame"] == "a: b"
+    assert told.keys() == {"vehicle", "motion", "lidars"}
+    assert "links a: b to top\\ncameras: [" in text

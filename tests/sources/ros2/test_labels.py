@@ -3,7 +3,7 @@ import pytest
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.labels import LABEL_ID
-from semgrid_eval.sources.ros2.labels import LabelTable
+from semgrid_eval.sources.ros2.labels import LabelTable, likely_ids
 from semgrid_eval.sources.ros2.mapping import HIGHEST_POINT
 
 
@@ -39,3 +39,7 @@ def test_ids_that_are_not_named_are_refused(ids, strange):
 def test_negative_ids_are_refused():
     with pytest.raises(InputError, match=r"^ids: -1 is a label, but not in the map$"):
         LabelTable({"road": (1,)}).label_ids(np.array([1, -1], np.int8))
+
+
+def test_the_kind_of_ids_is_guessed_by_the_highest():
+    assert [likely_ids(highest) for highest in (18, 19, 33)] == ["train_ids", "label_ids", "label_ids"]

@@ -78,7 +78,7 @@ def test_samples_between_begin_with_the_one_before():
 @pytest.mark.parametrize(
     ("speed", "turning", "said"),
     [
-        ([(1.0, 0.0)], [(0.0, 0.0, 0.0)] * 5, "/odom: has 1 samples of the motion; 2 are needed"),
+        ([(1.0, 0.0)], [(0.0, 0.0, 0.0)] * 5, "/odom: has 1 sample of the motion; 2 are needed"),
         ([(1.0, 0.0)] * 5, [(0.0, 0.0, math.inf)] * 5, "/imu: .* is not finite"),
     ],
 )

@@ -168,6 +168,7 @@ CLOUDS = Kind(
         _cloud("without x", _field("x", name="range")),
         _cloud("without labels", _field("label", name="colour")),
         _cloud("without times", _field("ring", name="beam")),
+        _cloud("with two fields z", _field("label", name="z")),
         _cloud("whose x is a whole number", _field("x", datatype=5)),
         _cloud("whose x has an unknown type", _field("x", datatype=77)),
         _cloud("whose labels are fractions", _field("label", datatype=7)),

@@ -20,7 +20,7 @@ from semgrid_eval.files import digest_files
 
 _DIGEST = re.compile(r"\b(?=[0-9]*[a-f])[0-9a-f]{16}\b")  # of what versions of packages are part of, too
 _FINDING = ": error: |: not recovered: "  # of `check`, on stdout
-_PROGRESS = r"\w[\w ]*: \d+/\d+|\S+: \d+ written|\d+ logs (checked|saved)|\d+ recordings in|$"
+_PROGRESS = r"\w[\w ]*: \d+/\d+|\S+: \d+ written|[\d,]+ logs? (checked|saved)|[\d,]+ recordings? in|$"
 _NOT_ERRORS = rf"Usage: |Try 'semgrid-eval|Warning: |{_PROGRESS}"
 
 

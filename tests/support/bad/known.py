@@ -1,6 +1,7 @@
 """All kinds of bad inputs."""
 
 from support.bad import (
+    axes,
     bags,
     cityscapes,
     class_sets,
@@ -21,7 +22,7 @@ from support.bad import (
 )
 
 KINDS = (
-    *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, matrices.STREAM, class_sets.KIND, on_logs.KIND),
+    *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, axes.KIND, matrices.STREAM, class_sets.KIND, on_logs.KIND),
     *latencies.KINDS,
     *(own_models.MODEL, predictions.KIND, contracts.CONTRACT),
     *(*cityscapes.KINDS, *bags.KINDS, *drives.KINDS),

@@ -55,20 +55,10 @@ extends: bad.yaml
 extends: [baselines]
 extends: baselines\nrows: [{name: BL-DC, modle: fuse}]
 rows: [{model: newest}]
-rows: [{name: a, model: ed, axes: {zip: {settings.depth: [2, 3], settings.features: [16]}}}]
-rows: [{name: a, model: ed, axes: {product: {settings.depth: [2, 3]}}}]
-rows: [{name: a, model: ed, axes: {grid: {settings.depth: 3}}}]
-rows: [{name: "a{settings.dept}", model: ed, axes: {grid: {settings.depth: [2, 3]}}}]
-rows: [{name: a, model: ed, axes: {grid: {settings.depth: [2, 3]}}}]
-rows: [{name: "a{settings.dept}", model: ed, axes: {grid: {settings.dept: [2, 3]}}}]
-rows: [{name: a, model: ed, axes: [settings.depth]}]
 """
 
 LONG_FILES = {
     "a title of 201 characters": f"title: {'t' * 201}\nrows: [{{name: a, model: newest}}]",
-    "axes that give more than 10,000 rows": "rows: [{name: a, model: ed, axes: {grid: {"
-    + ", ".join(f"settings.x{each}: [{', '.join(map(str, range(22)))}]" for each in range(3))
-    + "}}}]",
 }
 
 ROWS = r"""
