@@ -20,6 +20,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from semgrid_eval.classes import CLASS_NAMES
+from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_value, require_file_name
 from semgrid_eval.geometry import optical_quaternion
 from semgrid_eval.log.schemas.actors_pb2 import Actor as ActorMessage
@@ -27,7 +28,7 @@ from semgrid_eval.log.schemas.actors_pb2 import Actors
 from semgrid_eval.log.schemas.egomotion_pb2 import Egomotion
 from semgrid_eval.log.schemas.stereo_calibration_pb2 import CameraExtrinsics, StereoCalibration
 from semgrid_eval.log.topics import BASE_FRAME, GRID_FRAME, MAP_FRAME, ODOM_FRAME, optical_frame
-from semgrid_eval.recording.colour import kind_of
+from semgrid_eval.recording.colour import ImageSize, kind_of
 from semgrid_eval.recording.types import Actor, CameraCalibration, MotionSample, Pose, Quantity
 
 RECORD = "semgrid.scene"
@@ -184,10 +185,22 @@ def calibration_messages(
         timestamp=timestamp(stamp_ns),
         frame_id=optical_frame(camera),
         parent_frame_id=BASE_FRAME,
-        baseline_m=calibration.baseline_m,
+        baseline_m=calibration.baseline_m,  # None leaves it 0
         extrinsics=CameraExtrinsics(**{name: getattr(calibration, name) for name in _EXTRINSICS}),
     )
     return known, rest
+
+
+def read_calibrated_size(known: bytes) -> ImageSize:
+    """Return the size of the pictures that the first message of `calibration_messages` is for.
+
+    Raises:
+        InputError: it is none.
+    """
+    camera = CalibrationMessage.FromString(known)
+    if not camera.width * camera.height:
+        raise InputError(f"is for pictures of {camera.width} x {camera.height}")
+    return ImageSize(camera.width, camera.height)
 
 
 def read_calibration(known: bytes, rest: bytes) -> CameraCalibration:
@@ -202,7 +215,7 @@ def read_calibration(known: bytes, rest: bytes) -> CameraCalibration:
         raise ValueError(f"a camera matrix has {len(camera.K)} values")
     return CameraCalibration(
         **dict(zip(_INTRINSICS, (camera.K[0], camera.K[4], camera.K[2], camera.K[5]), strict=True)),
-        baseline_m=stereo.baseline_m,
+        baseline_m=stereo.baseline_m or None,
         **{name: getattr(stereo.extrinsics, name) for name in _EXTRINSICS},
     )
 

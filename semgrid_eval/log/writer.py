@@ -19,7 +19,7 @@ from semgrid_eval.motion import EgoMotion, implausible
 from semgrid_eval.recording.colour import ImageSize, read_size, require_whole
 from semgrid_eval.recording.lidar import LidarSweep
 from semgrid_eval.recording.png import read_header, require_pixels, with_palette
-from semgrid_eval.recording.types import CameraFrame, Moment, Recording
+from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment, Recording
 
 CHUNK_BYTES = 1 << 20
 LIBRARY = f"semgrid-eval/{__version__}"
@@ -175,8 +175,10 @@ class MomentWriter:
             self._writer.write(topics.TRUE_ACTORS, codec.actors_message(now_ns, moment.actors), log_ns=now_ns)
 
     def _camera(self, camera: str, frame: CameraFrame) -> None:
-        size_px = self._whole(camera, topics.DISPARITY, frame.disparity_png, frame.stamp_ns)
         calibration = self._recording.calibrations[camera]
+        with located(field=f"{self._recording.name}: camera {camera} at {frame.stamp_ns} ns"):
+            channel, file = _main_picture(frame, calibration)
+        size_px = self._whole(camera, channel, file, frame.stamp_ns)
         known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, size_px)
         self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
         self._writer.write(camera_topic(camera, topics.STEREO), rest, log_ns=frame.stamp_ns)
@@ -207,3 +209,25 @@ class MomentWriter:
                 return read_size(png) if self._recording.encoded_here else require_whole(png)
             header = read_header(png) if self._recording.encoded_here else require_pixels(png)
             return ImageSize(header.width, header.height)
+
+
+def _main_picture(frame: CameraFrame, calibration: CameraCalibration) -> tuple[str, bytes]:
+    """Return the channel and the file of the picture that tells the size of a frame: of a single camera the image.
+
+    Raises:
+        InputError: there is disparity without a baseline, or a baseline without disparity; or there is nothing at all.
+    """
+    disparity = frame.disparity_png or frame.exact_disparity_png
+    if calibration.baseline_m is None and disparity is not None:
+        raise InputError("has disparity, but its calibration no baseline_m")
+    if calibration.baseline_m is not None and frame.disparity_png is None:
+        raise InputError("has no disparity; the calibration of a camera without has no baseline_m either")
+    shown = {
+        topics.DISPARITY: frame.disparity_png,
+        topics.IMAGE: frame.image_file,
+        topics.LABEL: frame.label_png,
+    }
+    for channel, file in shown.items():
+        if file is not None:
+            return channel, file
+    raise InputError("has neither disparity nor image nor labels")

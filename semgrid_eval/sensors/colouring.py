@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import LogError, located
-from semgrid_eval.log.topics import DISPARITY, LABEL, camera_topic
+from semgrid_eval.log.topics import LABEL, camera_topic
 from semgrid_eval.motion import EgoMotion
-from semgrid_eval.recording.png import decode_gray, read_header
+from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.sensors.projection import unit_projection
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Colouring:
     def __init__(self, log: "LogReader", settings: "ColourFrom") -> None:
         self._path, self._settings = log.path, settings
         self._camera = log.choose_camera(settings.camera)
-        self._calibration = log.calibration(self._camera)
+        self._projection = unit_projection(log.calibration(self._camera), log.image_size(self._camera))
         self._motion = EgoMotion(log.motion(), "arc")
         self._frames = log.frames(self._camera)
         self._nearest, self._next = next(self._frames, None), next(self._frames, None)
@@ -78,20 +78,16 @@ class Colouring:
             place = f"frame of {self._camera} at {frame.stamp_ns} ns"
             message = "has no label image to colour points by; `semgrid-eval segment` adds them"
             raise LogError(message, path=self._path, field=place)
-        with located(field=self._place(LABEL, frame), path=self._path, kind=LogError):
+        place = f"{camera_topic(self._camera, LABEL)} at {frame.stamp_ns} ns"
+        with located(field=place, path=self._path, kind=LogError):
             return decode_gray(frame.label_png, bit_depth=8)
 
     def _projected(self, frame: "CameraFrame", stamp_ns: int, place_m: Floats) -> Floats:
         """Return u, v in images whose sides are 1 long, times depth, and depth (m): (3, N)."""
-        with located(field=self._place(DISPARITY, frame), path=self._path, kind=LogError):
-            header = read_header(frame.disparity_png)
         now, then = (self._motion.odom_from_vehicle(each) for each in (stamp_ns, frame.stamp_ns))
         moved_m = now.seen_from(then).apply(place_m[:, :2])
         points = np.column_stack([moved_m, place_m[:, 2], np.ones(len(place_m))])
-        return np.asarray(unit_projection(self._calibration, (header.width, header.height)) @ points.T, np.float64)
-
-    def _place(self, channel: str, frame: "CameraFrame") -> str:
-        return f"{camera_topic(self._camera, channel)} at {frame.stamp_ns} ns"
+        return np.asarray(self._projection @ points.T, np.float64)
 
 
 @dataclass(frozen=True)

@@ -38,11 +38,9 @@ class CameraSeen:
 
     @property
     def lacks(self) -> str:
-        """What the bag does not give of it, in words; empty if grids can be made of it."""
+        """What the bag does not give of it, in words; empty if a log can hold it."""
         if not self.info:
             return "no CameraInfo of its size is in the bag"
-        if not (self.disparity or self.depth or self.right):
-            return "nothing in the bag tells its depth"
         return "" if self.image or self.labels else "it has neither images nor labels"
 
 
