@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError, LogError, ResultError, SemgridError
 from semgrid_eval.executors import Executor
@@ -174,7 +173,9 @@ def _track(reader: LogReader, grid: GridConfig, camera: str | None) -> Track:
         start_ns=reader.start_ns,
         stamps_ns=np.array([pose.stamp_ns for pose in poses], np.int64),
         poses=np.array([(pose.x_m, pose.y_m, pose.yaw_rad) for pose in poses], np.float64).reshape(-1, 3),
-        projection=np.zeros((3, 4)) if camera is None else unit_projection(reader.calibration(camera), reader.image_size(camera)),
+        projection=np.zeros((3, 4))
+        if camera is None
+        else unit_projection(reader.calibration(camera), reader.image_size(camera)),
     )
 
 
