@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -87,10 +89,18 @@ def test_camera_matrix_is_what_viewers_expect():
     assert codec.read_calibration(known.SerializeToString(), rest.SerializeToString()) == CALIBRATION
 
 
+def test_a_single_camera_has_no_baseline_before_and_after():
+    calibration = replace(CALIBRATION, baseline_m=None)
+    known, rest = codec.calibration_messages(START_NS, "left", calibration, (64, 32))
+    assert rest.baseline_m == 0.0
+    assert codec.read_calibration(known.SerializeToString(), rest.SerializeToString()) == calibration
+    assert codec.read_calibrated_size(known.SerializeToString()) == (64, 32)
+
+
 def test_incomplete_or_impossible_calibration_is_refused():
     known, rest = codec.calibration_messages(START_NS, "front", CALIBRATION, (64, 32))
-    rest.baseline_m = 0.0
-    with pytest.raises(InputError, match=r"baseline_m: 0\.0 is not positive"):
+    rest.baseline_m = -0.1
+    with pytest.raises(InputError, match=r"baseline_m: -0\.1 is not positive"):
         codec.read_calibration(known.SerializeToString(), rest.SerializeToString())
     del known.K[5:]
     with pytest.raises(ValueError, match="a camera matrix has 5 values"):
