@@ -101,7 +101,7 @@ class CameraMap(Config):
             raise ValueError(f"image, labels, {', '.join(_DEPTHS)}: one is needed")
         for name in ("baseline_m", "right_info"):
             if getattr(self, name) is not None:
-                raise ValueError(f"{name} is of {', '.join(_DEPTHS)}, and none is named")
+                raise ValueError(f"{name} needs one of {', '.join(_DEPTHS)}")
 
     @model_validator(mode="after")
     def _names_known_labels(self) -> Self:
