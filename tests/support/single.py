@@ -2,15 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from support.toy_world import FRAME_NS, START_NS, Mount, ToyWorld, street
 
 from semgrid_eval.recording.lidar import LidarSweep
 from semgrid_eval.recording.lidar import Mount as Roof
-from semgrid_eval.recording.types import CameraFrame, Moment, Recording
+from semgrid_eval.recording.types import CameraFrame, Moment, MotionSample, Recording
 
-LATE_NS = 20_000_000
+LATE_NS = FRAME_NS // 2
 ROOF = Roof((1.0, 0.0, 1.9), (0.0, 0.0, 0.0, 1.0))
 RIG = {"left": Mount(0.4), "right": Mount(-0.4, LATE_NS)}
 _EVERY_PX, _FARTHEST_M = 3, 60.0
@@ -35,6 +36,7 @@ def _bare(frame: CameraFrame) -> CameraFrame:
     return replace(frame, disparity_png=None, exact_disparity_png=None)
 
 
+@cache
 def single_rig(*, frames: int = 16, seed: int = 1, split: str = "val", labelled: bool = False) -> Recording:
     """A street seen by two single cameras with clocks of their own, and every second time by a LiDAR.
 
@@ -47,9 +49,12 @@ def single_rig(*, frames: int = 16, seed: int = 1, split: str = "val", labelled:
         for moment in seen.moments():
             since_ns = moment.stamp_ns - START_NS
             swept = since_ns % (2 * FRAME_NS) == 0
-            yield replace(moment, sweeps={"top": swept_street(world, since_ns, labelled=labelled)} if swept else {})
+            sample = MotionSample(moment.stamp_ns, world.speed_mps, world.yaw_rate_radps)
+            sweeps = {"top": swept_street(world, since_ns, labelled=labelled)} if swept else {}
+            yield replace(moment, motion=(sample,), sweeps=sweeps)
 
-    return replace(seen, moments=moments)
+    found = tuple(moments())
+    return replace(seen, moments=lambda: iter(found))
 
 
 def swept_street(world: ToyWorld, since_ns: int, *, labelled: bool) -> LidarSweep:
