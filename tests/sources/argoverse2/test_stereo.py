@@ -11,7 +11,7 @@ from support.argoverse_log import (
     STEREO_OFFSET_NS,
     STEREO_SIZE,
     STEREO_STEP_NS,
-    stereo_tables,
+    camera_tables,
     write_argoverse,
     write_small_images,
     write_table,
@@ -85,7 +85,7 @@ def test_the_camera_is_where_the_left_one_is_above_the_ground(folder):
 
 def test_the_lens_of_which_images_are_rid_is_not_undone_again(folder):
     before = StereoCamera(folder).calibration
-    table = stereo_tables()[0]
+    table = camera_tables()[0]
     for name in ("k1", "k2", "k3"):
         del table[name]
     write_table(folder / "calibration" / "intrinsics.feather", table)
@@ -146,7 +146,7 @@ def cut(folder):
 
 def with_intrinsics(change):
     def damage(folder):
-        table = stereo_tables()[0]
+        table = camera_tables()[0]
         change(table)
         write_table(folder / "calibration" / "intrinsics.feather", table)
 
@@ -154,7 +154,7 @@ def with_intrinsics(change):
 
 
 def other_way_round(folder):
-    table = stereo_tables()[1]
+    table = camera_tables()[1]
     table["sensor_name"].reverse()
     write_table(folder / "calibration" / "egovehicle_SE3_sensor.feather", table)
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 from support.argoverse_log import (
+    camera_tables,
     columns,
     pose_columns,
-    stereo_tables,
     write_argoverse,
     write_small_images,
     write_table,
@@ -102,7 +102,7 @@ DRIVES = Kind(
         Bad("one camera of the stereo pair", ARGOVERSE, spoil=lambda: rmtree(IMAGES / "stereo_front_right")),
         Bad("images of another size than the calibration", ARGOVERSE, spoil=lambda: write_small_images(IMAGES)),
         Bad("images without calibration", ARGOVERSE, spoil=INTRINSICS.unlink),
-        _table("images of a camera that is not calibrated", INTRINSICS, lambda: stereo_tables()[0], _others),
+        _table("images of a camera that is not calibrated", INTRINSICS, lambda: camera_tables()[0], _others),
     ),
 )
 GRIDS = Kind(
