@@ -52,7 +52,9 @@ def read_lidars(
 
 
 def lidar_sweeps(log: "LogReader", sensor: LidarSensor) -> str:
-    """Return the topic of a sensor's sweeps; a LogError says that there is no such LiDAR."""
+    """Return the topic of a sensor's sweeps; a LogError says that there is no such LiDAR, or no camera to colour it."""
+    if sensor.colour_from is not None:
+        log.choose_camera(sensor.colour_from.camera)
     return lidar_topic(log.choose_lidar(sensor.lidar))
 
 

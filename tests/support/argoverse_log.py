@@ -190,9 +190,9 @@ def write_stereo(folder: Path) -> None:
             cv2.imwrite(str(images / f"{stamp_ns}.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 95])
 
 
-def write_small_images(images: Path) -> None:
-    """Make the images of the left camera smaller than its calibration says."""
-    for path in sorted((images / "stereo_front_left").iterdir()):
+def write_small_images(images: Path, camera: str = "stereo_front_left") -> None:
+    """Make the images of a camera smaller than its calibration says."""
+    for path in sorted((images / camera).iterdir()):
         cv2.imwrite(str(path), np.zeros((100, 200), np.uint8))
 
 
