@@ -5,9 +5,11 @@ looks straight ahead: what is Z m ahead, y m left and z m high is at u = 200 - 1
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.single import single
 from support.swept import START_NS, recorded, sweep
 from support.toy_world import png
 
@@ -177,3 +179,25 @@ def test_without_colouring_configurations_keep_their_digests():
     coloured = parse_config(GridConfig, {"sensors": {"top": {"kind": "lidar", "colour_from": {}}}, "target": ["top"]})
     assert coloured.sensors["top"].colour_from == ColourFrom()
     assert parse_config(GridConfig, coloured.model_dump(mode="json")) == coloured
+
+
+def test_a_camera_without_disparity_colours_as_the_same_with_it(tmp_path):
+    found = []
+    for name, change in (("stereo", lambda recording: recording), ("single", single)):
+        write_log(change(rig_of(label_image(car=(110, 190)))), tmp_path / f"{name}.mcap")
+        with LogReader(tmp_path / f"{name}.mcap") as log:
+            sensors = {"top": LidarSensor(colour_from=ColourFrom())}
+            (points,) = read_lidars(log, sensors, DEFAULT_CLASSES.class_by_label())
+        found.append(points.class_id.tolist())
+    assert found == [[CAR, NO_POINT]] * 2
+
+
+def rig_of(label):
+    """One sweep beside one frame."""
+    points = [(10, 1, -1), (10, -2, 0)]
+
+    def moments():
+        sweeps = {"top": sweep(START_NS, points, mount=MOUNT)}
+        yield Moment(START_NS, {"front": frame(0, label)}, (MotionSample(START_NS, 0.0, 0.0),), sweeps=sweeps)
+
+    return replace(recorded(moments), calibrations={"front": CAMERA})

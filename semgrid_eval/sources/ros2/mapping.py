@@ -98,7 +98,7 @@ class CameraMap(Config):
 
     def _check_single(self) -> None:
         if self.image is None and self.labels is None:
-            raise ValueError(f"image, labels, {', '.join(_DEPTHS)}: one is needed")
+            raise ValueError("names neither image nor labels, nor what tells its depth")
         for name in ("baseline_m", "right_info"):
             if getattr(self, name) is not None:
                 raise ValueError(f"{name} needs one of {', '.join(_DEPTHS)}")
