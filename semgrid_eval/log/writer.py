@@ -23,6 +23,8 @@ from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment,
 
 CHUNK_BYTES = 1 << 20
 LIBRARY = f"semgrid-eval/{__version__}"
+_CALIBRATED = (topics.DISPARITY, topics.IMAGE, topics.LABEL)
+"""Channels whose pictures have the size that a camera is calibrated for; the first that a frame has tells it."""
 
 
 def open_writer(stream: BinaryIO) -> Writer:
@@ -177,22 +179,24 @@ class MomentWriter:
     def _camera(self, camera: str, frame: CameraFrame) -> None:
         calibration = self._recording.calibrations[camera]
         with located(field=f"{self._recording.name}: camera {camera} at {frame.stamp_ns} ns"):
-            channel, file = _main_picture(frame, calibration)
-        size_px = self._whole(camera, channel, file, frame.stamp_ns)
+            _require_sound(frame, calibration)
+        pictures = {
+            channel: png
+            for field, (channel, _) in topics.PICTURES.items()
+            if (png := getattr(frame, field)) is not None
+        }
+        sizes = {channel: self._whole(camera, channel, png, frame.stamp_ns) for channel, png in pictures.items()}
+        size_px = next(sizes[channel] for channel in _CALIBRATED if channel in sizes)
         known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, size_px)
         self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
         self._writer.write(camera_topic(camera, topics.STEREO), rest, log_ns=frame.stamp_ns)
-        for picture, (channel, notes) in topics.PICTURES.items():
-            png: bytes | None = getattr(frame, picture)
-            if png is None:
-                continue
-            self._whole(camera, channel, png, frame.stamp_ns)
-            if channel in (topics.LABEL, topics.EXACT_LABEL):
-                png = with_palette(png, self._palette)
+        notes = dict(topics.PICTURES.values())
+        for channel, png in pictures.items():
+            shown = with_palette(png, self._palette) if channel in (topics.LABEL, topics.EXACT_LABEL) else png
             if channel == topics.IMAGE:
                 self._writer.end_chunk()
-            message = codec.image_message(frame.stamp_ns, camera, png)
-            self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes)
+            message = codec.image_message(frame.stamp_ns, camera, shown)
+            self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes[channel])
         self._writer.end_chunk()
 
     def _sweep(self, lidar: str, sweep: LidarSweep) -> None:
@@ -211,23 +215,12 @@ class MomentWriter:
             return ImageSize(header.width, header.height)
 
 
-def _main_picture(frame: CameraFrame, calibration: CameraCalibration) -> tuple[str, bytes]:
-    """Return the channel and the file of the picture that tells the size of a frame: of a single camera the image.
-
-    Raises:
-        InputError: there is disparity without a baseline, or a baseline without disparity; or there is nothing at all.
-    """
+def _require_sound(frame: CameraFrame, calibration: CameraCalibration) -> None:
+    """Refuse disparity without a baseline, a baseline without disparity, and a frame of nothing."""
     disparity = frame.disparity_png or frame.exact_disparity_png
     if calibration.baseline_m is None and disparity is not None:
         raise InputError("has disparity, but its calibration no baseline_m")
     if calibration.baseline_m is not None and frame.disparity_png is None:
         raise InputError("has no disparity; the calibration of a camera without has no baseline_m either")
-    shown = {
-        topics.DISPARITY: frame.disparity_png,
-        topics.IMAGE: frame.image_file,
-        topics.LABEL: frame.label_png,
-    }
-    for channel, file in shown.items():
-        if file is not None:
-            return channel, file
-    raise InputError("has neither disparity nor image nor labels")
+    if frame.disparity_png is frame.image_file is frame.label_png is None:
+        raise InputError("has neither disparity nor image nor labels")
