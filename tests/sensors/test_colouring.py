@@ -161,6 +161,32 @@ def test_several_sweeps_each_find_their_image(tmp_path):
     assert found == [[CAR], [ROAD], [CAR]]
 
 
+def test_of_several_cameras_the_first_that_sees_a_point_gives_its_label(tmp_path):
+    """The second one looks back, and sees what is behind; what both miss has no class."""
+    back = replace(CAMERA, yaw_rad=math.pi)
+    images = {"ahead": frame(0, label_image("car")), "back": frame(0, label_image("pole"))}
+    points = [(10, 1, 0), (-10, 1, 0), (0, 10, 0)]
+    sweeps = {"top": sweep(START_NS, points, mount=MOUNT)}
+
+    def moments():
+        yield Moment(START_NS, images, (MotionSample(START_NS, 0.0, 0.0),), sweeps=sweeps)
+
+    cameras = {"ahead": CAMERA, "back": back, "above": CAMERA}
+    images["above"] = frame(0, label_image("road"))
+    write_log(replace(recorded(moments), calibrations=cameras), tmp_path / "log.mcap")
+    found = {}
+    with LogReader(tmp_path / "log.mcap") as log:
+        for names in (("ahead", "back"), ("back", "above", "ahead"), ("back",)):
+            sensors = {"top": LidarSensor(colour_from=ColourFrom(camera=names))}
+            (seen,) = read_lidars(log, sensors, DEFAULT_CLASSES.class_by_label())
+            found[names] = seen.class_id.tolist()
+    assert found == {
+        ("ahead", "back"): [CAR, POLE, NO_POINT],
+        ("back", "above", "ahead"): [ROAD, POLE, NO_POINT],
+        ("back",): [NO_POINT, POLE, NO_POINT],
+    }
+
+
 @pytest.mark.parametrize(
     ("settings", "image", "line"),
     [

@@ -12,9 +12,8 @@ _ONLY = "front"
 _LONGEST_NAME = 40  # of a sensor in a grid
 _VIRTUAL_BASELINE_M = 0.5
 _SINGLE = """\
-    # Nothing in the bag tells its depth, so it has no grids: its labels colour the points of a LiDAR (colour_from of
-    # the sensor in a grid), and reports show its images. disparity, depth, or a right image whose CameraInfo has the
-    # baseline in P can stand here."""
+    # Nothing in the bag tells its depth (disparity, depth, or a right image whose CameraInfo has the baseline in P):
+    # no grids of its own, but its labels colour a LiDAR's points (colour_from of the sensor), and reports show it."""
 
 
 def draft_cameras(contents: Contents, vehicle: str) -> Iterator[str]:

@@ -163,7 +163,7 @@ def test_a_camera_without_depth_is_drafted_with_what_it_is_good_for_beside_other
         image("/rear/image", "rear"),
         sent("/tf_static", camera_link("rear", ONE.calibration())),
     ]
-    told = "    # Nothing in the bag tells its depth, so it has no grids: its labels colour the points of a LiDAR"
+    told = "    # Nothing in the bag tells its depth (disparity, depth, or a right image whose CameraInfo has"
     alone, beside = tmp_path / "alone", tmp_path / "beside"
     for here, others in ((alone, [motion()]), (beside, [*rig(front=Mount()), image("/side/image", "side")])):
         here.mkdir()

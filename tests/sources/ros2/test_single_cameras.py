@@ -23,8 +23,8 @@ from semgrid_eval.scores.results import read_run
 
 COLOURED = {
     "spec": {"agent_row": 96},
-    "sensors": {name: {"kind": "lidar", "colour_from": {"camera": name}} for name in ("left", "right")},
-    "target": ["left", "right"],
+    "sensors": {"top": {"kind": "lidar", "colour_from": {"camera": ["left", "right"]}}},
+    "target": ["top"],
 }
 OWN = {**COLOURED, "sensors": {"top": {"kind": "lidar"}}, "target": ["top"]}
 MATRIX = {
@@ -77,13 +77,11 @@ def test_coloured_points_have_the_classes_of_what_they_hit(bag, tmp_path):
     write_log(single_rig(labelled=True), tmp_path / "own.mcap")
     (coloured,) = build_log(find_logs(Path("logs"))[0], parse_config(GridConfig, COLOURED))
     (own,) = build_log(tmp_path / "own.mcap", parse_config(GridConfig, OWN))
-    left, right, both = coloured.grids
-    known = (both != UNKNOWN) & (own.grids[0] != UNKNOWN)
+    known = (coloured.grids[0] != UNKNOWN) & (own.grids[0] != UNKNOWN)
     assert known.sum() > 0.7 * (own.grids[0] != UNKNOWN).sum()
-    assert (both == own.grids[0])[known].mean() > 0.98
-    columns = np.arange(both.shape[2])
-    middles = [np.average(columns, weights=(each != UNKNOWN).sum(axis=(0, 1))) for each in (left, right)]
-    assert middles[0] < 64 < middles[1]
+    assert (coloured.grids == own.grids)[0][known].mean() > 0.98
+    for side in (np.s_[..., :60], np.s_[..., 68:]):
+        assert known[side].sum() > 0.3 * known.sum(), "both cameras do their part"
 
 
 def test_the_drafted_map_the_network_and_baselines_lead_to_a_report_with_pictures(tmp_path, monkeypatch):

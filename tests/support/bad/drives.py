@@ -132,6 +132,8 @@ GRIDS = Kind(
         _grid("points coloured by a camera without labels", "unlabelled", "{kind: lidar, colour_from: {}}"),
         _grid("points of a camera without disparity", "single", "{camera: left}"),
         _grid("points coloured by one of two cameras, not named", "single", "{kind: lidar, colour_from: {}}"),
+        _grid("points coloured by no camera", "single", "{kind: lidar, colour_from: {camera: []}}"),
+        _grid("a second camera to colour points, absent", "single", "{kind: lidar, colour_from: {camera: [left, up]}}"),
         _grid("colour_from is a name", "unlabelled", "{kind: lidar, colour_from: front}"),
         _grid("colours of a time too long ago", "unlabelled", "{kind: lidar, colour_from: {within_s: 5}}"),
     ),
