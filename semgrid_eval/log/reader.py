@@ -1,7 +1,7 @@
 """Read one log: what it says of itself, its channels, and what its messages hold, in the order of time."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import groupby, product
 from pathlib import Path
@@ -9,9 +9,10 @@ from typing import Any, NamedTuple, TypeVar
 
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.faults import not_one_of
-from semgrid_eval.log import codec, recovered, topics
+from semgrid_eval.log import calibrations, codec, recovered, topics
 from semgrid_eval.log.codec import CONDITIONS_RECORD, PLAYBACK_RECORD, PREDICTIONS_RECORD, RECORD, Scene
 from semgrid_eval.log.container import Container, damage_as_log_error
+from semgrid_eval.log.frames import FILES, Picture, camera_frames, picture_topics
 from semgrid_eval.log.recovered import Recovered
 from semgrid_eval.log.sweeps import read_sweep
 from semgrid_eval.log.topics import camera_topic, lidar_topic
@@ -38,23 +39,11 @@ _CAMERA_TYPES = {
     topics.STEREO: "semgrid.v1.StereoCalibration",
 }
 _LIDAR_TYPE = "foxglove.PointCloud"
-_FILES = {**dict.fromkeys(topics.PICTURE_FIELDS, codec.read_image), topics.CALIBRATION: lambda _: b""}
-"""What reads the file in a message of a channel; of a calibration there is none."""
-_MAIN_FIELDS = ("image_file", "disparity_png", "label_png")
 _OTHERS = {
     PLAYBACK_RECORD: "is a run to be watched, as `semgrid-eval play` writes it, not a recording",
     PREDICTIONS_RECORD: "holds predictions, not a recording",
 }
 """What logs of this package are that are not recordings, by their metadata record."""
-
-
-class Picture(NamedTuple):
-    """A PNG file of a camera, or JPEG if in colour; `channel` is one of `topics.PICTURES`, or a calibration's."""
-
-    stamp_ns: int
-    camera: str
-    channel: str
-    png: bytes
 
 
 class Decoded(NamedTuple):
@@ -157,7 +146,7 @@ class LogReader(Container):
         known = self._first(camera_topic(camera, topics.CALIBRATION))
         rest = self._first(camera_topic(camera, topics.STEREO))
         with self._faults_at(camera_topic(camera, topics.CALIBRATION)):
-            found = codec.read_calibration(known, rest)
+            found = calibrations.read_calibration(known, rest)
         disparity = camera_topic(camera, topics.DISPARITY)
         if found.baseline_m is None and disparity in self.schemas():
             place = f"{camera_topic(camera, topics.STEREO)}: baseline_m"
@@ -169,7 +158,7 @@ class LogReader(Container):
         topic = camera_topic(self.choose_camera(camera), topics.CALIBRATION)
         known = self._first(topic)
         with self._faults_at(topic):
-            return codec.read_calibrated_size(known)
+            return calibrations.read_size(known)
 
     def is_single(self, camera: str) -> bool:
         """Tell whether a camera has no disparity."""
@@ -227,7 +216,7 @@ class LogReader(Container):
     def pictures(self, cameras: Iterable[str], channels: Iterable[str]) -> Iterator[Picture]:
         """Iterate over the pictures of some channels of some cameras in the order of time."""
         wanted = picture_topics(cameras, channels)
-        for topic, stamp_ns, png in self._decoded({topic: _FILES[channel] for topic, (_, channel) in wanted.items()}):
+        for topic, stamp_ns, png in self._decoded({topic: FILES[channel] for topic, (_, channel) in wanted.items()}):
             yield Picture(stamp_ns, *wanted[topic], png)
 
     def frames(self, camera: str, *, images: bool = False) -> Iterator[CameraFrame]:
@@ -286,11 +275,6 @@ class LogReader(Container):
         return entry.data
 
 
-def picture_topics(cameras: Iterable[str], channels: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Return camera and channel by topic."""
-    return {camera_topic(camera, channel): (camera, channel) for camera, channel in product(cameras, channels)}
-
-
 def _apart_from_motion(messages: Iterable[Decoded], motion: list[MotionSample]) -> Iterator[Decoded]:
     """Pass messages on, but move what they say of the motion to a list."""
     for message in messages:
@@ -298,19 +282,3 @@ def _apart_from_motion(messages: Iterable[Decoded], motion: list[MotionSample]) 
             motion.append(message.value)
         else:
             yield message
-
-
-def camera_frames(pictures: Iterable[Picture], single: Set[str]) -> Iterator[tuple[str, CameraFrame]]:
-    """Make frames of pictures in the order of time: those of one camera and one stamp, and the camera's name.
-
-    A frame without label, image or truth has None there; one without disparity is left out, but of `single` cameras.
-    """
-    for stamp_ns, of_one_time in groupby(pictures, key=lambda picture: picture.stamp_ns):
-        by_camera: dict[str, dict[str, bytes]] = {}
-        for picture in of_one_time:
-            found = by_camera.setdefault(picture.camera, {})
-            if picture.channel in topics.PICTURE_FIELDS:
-                found[topics.PICTURE_FIELDS[picture.channel]] = picture.png
-        for camera, found in by_camera.items():
-            if camera in single or "disparity_png" in found:
-                yield camera, CameraFrame(stamp_ns, **{**dict.fromkeys(_MAIN_FIELDS), **found})

@@ -12,6 +12,7 @@ from semgrid_eval import __version__
 from semgrid_eval.errors import InputError, located
 from semgrid_eval.labels import label_palette
 from semgrid_eval.log import codec, topics
+from semgrid_eval.log.calibrations import calibration_messages
 from semgrid_eval.log.container import MAX_STAMP_NS
 from semgrid_eval.log.sweeps import sweep_message
 from semgrid_eval.log.topics import camera_topic, lidar_topic
@@ -187,7 +188,7 @@ class MomentWriter:
         }
         sizes = {channel: self._whole(camera, channel, png, frame.stamp_ns) for channel, png in pictures.items()}
         size_px = next(sizes[channel] for channel in _CALIBRATED if channel in sizes)
-        known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, size_px)
+        known, rest = calibration_messages(frame.stamp_ns, camera, calibration, size_px)
         self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
         self._writer.write(camera_topic(camera, topics.STEREO), rest, log_ns=frame.stamp_ns)
         notes = dict(topics.PICTURES.values())
