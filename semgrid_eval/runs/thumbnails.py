@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError, LogError, ResultError, SemgridError
 from semgrid_eval.executors import Executor
@@ -173,10 +174,14 @@ def _track(reader: LogReader, grid: GridConfig, camera: str | None) -> Track:
         start_ns=reader.start_ns,
         stamps_ns=np.array([pose.stamp_ns for pose in poses], np.int64),
         poses=np.array([(pose.x_m, pose.y_m, pose.yaw_rad) for pose in poses], np.float64).reshape(-1, 3),
-        projection=np.zeros((3, 4))
-        if camera is None
-        else unit_projection(reader.calibration(camera), reader.image_size(camera)),
+        projection=_projection(reader, camera),
     )
+
+
+def _projection(reader: LogReader, camera: str | None) -> NDArray[np.float64]:
+    if camera is None:
+        return np.zeros((3, 4))
+    return unit_projection(reader.calibration(camera), reader.image_size(camera))
 
 
 def _requests(run: Path, windows: Iterable[tuple["WindowSet", GridConfig]]) -> list[Request]:
