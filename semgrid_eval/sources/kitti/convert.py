@@ -89,6 +89,7 @@ def _remark(sequences: list[KittiSequence], out: Path) -> str:
     """Say in one line what is not there."""
 
     def those(has: str = "", lacks: str = "") -> str:
+        """Name the sequences that have one channel and lack another."""
         chosen = (each for each in sequences if has in ("", *each.channels) and lacks not in each.channels)
         return ", ".join(each.folder.name for each in chosen)
 
