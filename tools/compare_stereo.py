@@ -96,7 +96,7 @@ def _measure_pixels(logs: list[Path], count: int) -> Tally:
         with LogReader(log) as reader:
             camera = reader.scene.cameras[0]
             calibration = reader.calibration(camera)
-            depth_disparity = calibration.fx_px * calibration.baseline_m
+            depth_disparity = calibration.depth_disparity_m_px
             chosen = set(_spread(range(sum(1 for _ in reader.frames(camera))), count))
             for index, frame in enumerate(reader.frames(camera)):
                 if index in chosen:
@@ -105,7 +105,7 @@ def _measure_pixels(logs: list[Path], count: int) -> Tally:
 
 
 def _add_pixels(tally: Tally, frame: CameraFrame, depth_disparity_m_px: float) -> None:
-    found = _disparity(frame.disparity_png, depth_disparity_m_px)
+    found = _disparity(frame.disparity_png or b"", depth_disparity_m_px)
     reached = slice(_first_column(found), None)
     found = found[:, reached]
     label = _small(decode_gray(frame.label_png or b"", bit_depth=8))[:, reached].astype(np.uint8)

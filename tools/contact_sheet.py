@@ -37,7 +37,7 @@ def draw_log(path: Path) -> Picture:
     grid = DEFAULT_CLASSES.palette()[build_log(path, GridConfig())[0].grids[0, 0]]
     image = np.asarray(Image.open(io.BytesIO(frame.image_file or b"")).convert("RGB"))
     label = label_palette()[decode_gray(frame.label_png or b"", bit_depth=8)]
-    disparity = decode_gray(frame.disparity_png, bit_depth=16)
+    disparity = decode_gray(frame.disparity_png or b"", bit_depth=16)
     near = np.clip(disparity / 256 / (NEAR_PX * disparity.shape[1]), 0, 1)
     colours = cv2.cvtColor(cv2.applyColorMap((near * 255).astype(np.uint8), cv2.COLORMAP_TURBO), cv2.COLOR_BGR2RGB)
     colours[disparity == 0] = 0

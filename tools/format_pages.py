@@ -96,10 +96,10 @@ is a camera's name, `{lidar}` a LiDAR's.
 | topic | type | what it holds |
 |---|---|---|
 | `/camera/{camera}/image` | `foxglove.CompressedImage` | colour image, PNG or JPEG; scores never read it |
-| `/camera/{camera}/disparity` | `foxglove.CompressedImage` | 16 bit PNG, (p - 1) / 256 px, 0 invalid |
+| `/camera/{camera}/disparity` | `foxglove.CompressedImage` | 16 bit PNG, (p - 1) / 256 px, 0 invalid; may be absent |
 | `/camera/{camera}/label` | `foxglove.CompressedImage` | 8 bit PNG of Cityscapes label ids |
 | `/camera/{camera}/calibration` | `foxglove.CameraCalibration` | pinhole parameters of the rectified image |
-| `/camera/{camera}/stereo` | `semgrid.v1.StereoCalibration` | baseline |
+| `/camera/{camera}/stereo` | `semgrid.v1.StereoCalibration` | baseline (0: no disparity), place and angles |
 | `/ego/motion` | `semgrid.v1.EgoMotion` | speed and yaw rate as reported |
 | `/ego/pose` | `foxglove.PoseInFrame` | integrated from these, to look at |
 | `/tf` | `foxglove.FrameTransform` | `odom` to `base_link` (ISO 8855), and to each camera |

@@ -57,7 +57,7 @@ def measure_cells(material: Material) -> Iterator[Measurement]:
     with LogReader(material.log) as log:
         (camera,) = log.scene.cameras
         frame, calibration = next(iter(log.frames(camera))), log.calibration(camera)
-    disparity = decode_gray(frame.disparity_png, bit_depth=16)
+    disparity = decode_gray(frame.disparity_png or b"", bit_depth=16)
     label = decode_gray(frame.label_png or b"", bit_depth=8)
     view, turned = View(calibration, CameraSensor().image_size_px, config.class_by_label()), SE2(0.0, 0.0, 0.2)
     projection = Projection(*view)

@@ -44,7 +44,7 @@ def grid_by_arrays(disparity: Image, label: Image, view: View, grid_from_vehicle
     disparity, label = (nearest(image, view.size_px) for image in (disparity, label))
     class_id = np.where(disparity > 1, view.class_by_label[label], NO_POINT)
     used = class_id != NO_POINT
-    depth_m = camera.fx_px * camera.baseline_m * 256.0 / (disparity[used] - 1.0)
+    depth_m = camera.depth_disparity_m_px * 256.0 / (disparity[used] - 1.0)
     place_m = np.array([[camera.x_m], [camera.y_m]]) + depth_m * slope[:, used]
     counts = _counted(place_m, class_id[used], grid_from_vehicle, spec)
     rank = np.where(

@@ -150,7 +150,7 @@ class GridConfig(Config):
 
 
 def _camera_of(sensor: SensorConfig) -> str | None:
-    """Return the name of the camera that a sensor is a part of, or is coloured by."""
+    """Return the name of the camera that a sensor is a part of, or of the first that it is coloured by."""
     if isinstance(sensor, CameraSensor):
         return sensor.camera
-    return sensor.colour_from.camera if isinstance(sensor, LidarSensor) and sensor.colour_from else None
+    return sensor.colour_from.cameras[0] if isinstance(sensor, LidarSensor) and sensor.colour_from else None

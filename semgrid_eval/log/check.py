@@ -6,7 +6,7 @@ from pathlib import Path
 from semgrid_eval.errors import LogError
 from semgrid_eval.log import topics
 from semgrid_eval.log.container import damage_as_log_error
-from semgrid_eval.log.contract import Contract, TopicContract, topics_of
+from semgrid_eval.log.contract import Cameras, Contract, TopicContract, topics_of
 from semgrid_eval.log.default_contract import default_contract
 from semgrid_eval.log.findings import Finding, LogReport, Severity, bounded, error
 from semgrid_eval.log.quantities import Extents, camera_extents, lidar_extents, motion_extents, truth_faults
@@ -17,7 +17,7 @@ from semgrid_eval.log.topics import camera_topic, lidar_topic
 from semgrid_eval.recording.types import Quantity
 
 _NEEDED = (topics.DISPARITY, topics.CALIBRATION, topics.STEREO)
-"""Channels of a camera without which its pictures cannot be looked at."""
+"""Channels of a camera without which its pictures cannot be looked at; a single camera has not the first."""
 _TRUTH = {topics.TRUE_POSE, topics.TRUE_ACTORS}
 
 
@@ -33,8 +33,9 @@ def check_log(path: Path, contract: Contract | None = None) -> LogReport:
             log.verify()
             conditions = log.conditions()
             log.road_map()  # which reads all attachments
-            timeline = _timeline(log, expected)
-            for finding in _findings(log, expected, timeline):  # one by one: those before damage count as well
+            cameras = _cameras(log)
+            timeline = _timeline(log, expected, cameras)
+            for finding in _findings(log, expected, timeline, cameras):  # one by one: those before damage count as well
                 findings.append(finding)
     except LogError as fault:
         is_readable = False
@@ -49,10 +50,23 @@ def _duration_s(timeline: Timeline) -> float:
     return (max(times_ns) - min(times_ns)) / 1e9 if times_ns else 0.0
 
 
-def _timeline(log: LogReader, contract: Contract) -> dict[str, list[Times]]:
+def _cameras(log: LogReader) -> Cameras:
+    """Tell the cameras with disparity from those without; who does not say counts as one that has it."""
+
+    def is_single(camera: str) -> bool:
+        try:
+            return log.is_single(camera)
+        except LogError:
+            return False
+
+    single = tuple(filter(is_single, log.scene.cameras))
+    return Cameras(tuple(camera for camera in log.scene.cameras if camera not in single), single)
+
+
+def _timeline(log: LogReader, contract: Contract, cameras: Cameras) -> dict[str, list[Times]]:
     """Read the clocks of all messages, stamps only of topics that the contract asks for; this reads the whole file."""
     stamped = {name for each in contract.latencies for name in (each.topic, each.after or each.topic)}
-    read = {topic for name in stamped for topic in topics_of(name, log.scene.cameras).values()}
+    read = {topic for name in stamped for topic in topics_of(name, cameras).values()}
     schemas = log.schemas()
     found: dict[str, list[Times]] = {topic: [] for topic in schemas}
     for entry in log.messages():
@@ -63,14 +77,13 @@ def _timeline(log: LogReader, contract: Contract) -> dict[str, list[Times]]:
     return found
 
 
-def _findings(log: LogReader, contract: Contract, timeline: Timeline) -> Iterator[Finding]:
-    cameras = log.scene.cameras
+def _findings(log: LogReader, contract: Contract, timeline: Timeline, cameras: Cameras) -> Iterator[Finding]:
     if contract.checksums and not log.has_checksums:
         yield Finding(contract.checksums, "file", "has no checksums, so damage cannot be seen")
     if recovered := log.recovered():
         yield Finding(Severity.WARNING, "file", str(recovered))
-    yield from judged(contract.cameras, "cameras", len(cameras), f"there are {len(cameras)}")
-    sensors = len(cameras) + len(log.lidars) + bool(timeline.get(topics.TRUE_ACTORS))
+    yield from judged(contract.cameras, "cameras", len(cameras.names), f"there are {len(cameras.names)}")
+    sensors = len(cameras.names) + len(log.lidars) + bool(timeline.get(topics.TRUE_ACTORS))
     yield from judged(contract.sensors, "sensors", sensors, f"there are {sensors}")
     duration_s = _duration_s(timeline)
     yield from judged(contract.duration_s, "duration_s", duration_s, f"is {duration_s:g} s")
@@ -83,7 +96,7 @@ def _findings(log: LogReader, contract: Contract, timeline: Timeline) -> Iterato
             yield from timing(topic, expected, timeline, camera)
             yield from coverage(topic, expected, timeline, cameras)
     yield from latencies(contract, timeline, cameras)
-    extents = yield from _extents(log, timeline)
+    extents = yield from _extents(log, timeline, cameras)
     yield from _values(contract, extents, cameras)
 
 
@@ -93,13 +106,14 @@ def _type(topic: str, expected: TopicContract, schemas: dict[str, str]) -> Itera
         yield error(f"{topic}: type", f"holds {found or 'untyped'} messages; {expected.type} is needed")
 
 
-def _extents(log: LogReader, timeline: Timeline) -> Generator[Finding, None, Extents]:
+def _extents(log: LogReader, timeline: Timeline, cameras: Cameras) -> Generator[Finding, None, Extents]:
     """Measure motion and cameras; what a camera lacks to be looked at is an error, whatever the contract says."""
     wrong = log.wrong_types()
     found = {} if topics.EGO_MOTION in wrong else motion_extents(log.motion())
     yield from () if wrong.keys() & _TRUTH else truth_faults(log)
-    for camera in log.scene.cameras:
-        needed = [camera_topic(camera, channel) for channel in _NEEDED]
+    for camera in cameras.names:
+        channels = _NEEDED[1:] if camera in cameras.single else _NEEDED
+        needed = [camera_topic(camera, channel) for channel in channels]
         shown = {*needed, *(camera_topic(camera, channel) for channel in topics.PICTURE_FIELDS)}
         lacking = [topic for topic in needed if not timeline.get(topic)] + sorted(shown & wrong.keys())
         if lacking:
@@ -111,7 +125,7 @@ def _extents(log: LogReader, timeline: Timeline) -> Generator[Finding, None, Ext
     return found
 
 
-def _values(contract: Contract, extents: Extents, cameras: tuple[str, ...]) -> Iterator[Finding]:
+def _values(contract: Contract, extents: Extents, cameras: Cameras) -> Iterator[Finding]:
     for name, expected in contract.topics.items():
         for topic in topics_of(name, cameras).values():
             for quantity, limit in expected.values.items():
@@ -122,7 +136,7 @@ def _values(contract: Contract, extents: Extents, cameras: tuple[str, ...]) -> I
                 yield from judged(limit, f"{topic}: {quantity}", worst, f"is {worst:g}")
     ids = [
         extents[topic]["label_id"].high
-        for camera in cameras
+        for camera in cameras.names
         if (topic := camera_topic(camera, topics.LABEL)) in extents
     ]
     if ids:

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration as CalibrationMessage
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -25,7 +24,6 @@ from semgrid_eval.geometry import optical_quaternion
 from semgrid_eval.log.schemas.actors_pb2 import Actor as ActorMessage
 from semgrid_eval.log.schemas.actors_pb2 import Actors
 from semgrid_eval.log.schemas.egomotion_pb2 import Egomotion
-from semgrid_eval.log.schemas.stereo_calibration_pb2 import CameraExtrinsics, StereoCalibration
 from semgrid_eval.log.topics import BASE_FRAME, GRID_FRAME, MAP_FRAME, ODOM_FRAME, optical_frame
 from semgrid_eval.recording.colour import kind_of
 from semgrid_eval.recording.types import Actor, CameraCalibration, MotionSample, Pose, Quantity
@@ -44,8 +42,6 @@ _MAX_STAMP_NS = 1 << 63
 _WORDS, _LISTS = ("name", "dataset", "split", "source_digest"), ("cameras", "class_names")  # of a scene
 _SHOWN = 40
 _GPS_FIELDS = ("latitude_deg", "longitude_deg", "heading_deg")
-_INTRINSICS = ("fx_px", "fy_px", "u0_px", "v0_px")
-_EXTRINSICS = ("x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad")
 _ACTOR_FIELDS = tuple(Actor.__dataclass_fields__)
 
 
@@ -161,50 +157,6 @@ def image_message(stamp_ns: int, camera: str, file: bytes) -> CompressedImage:
 def read_image(data: bytes) -> bytes:
     """Return the PNG or JPEG file in a message."""
     return bytes(CompressedImage.FromString(data).data)
-
-
-def calibration_messages(
-    stamp_ns: int, camera: str, calibration: CameraCalibration, size_px: tuple[int, int]
-) -> tuple[CalibrationMessage, StereoCalibration]:
-    """Split a calibration into what viewers know, for pictures of a size (width, height), and what they do not."""
-    fx, fy, u0, v0 = (getattr(calibration, name) for name in _INTRINSICS)
-    width, height = size_px
-    known = CalibrationMessage(
-        timestamp=timestamp(stamp_ns),
-        frame_id=optical_frame(camera),
-        width=width,
-        height=height,
-        distortion_model="plumb_bob",  # pictures are rectified, so all five coefficients are zero
-        D=[0.0] * 5,
-        K=[fx, 0.0, u0, 0.0, fy, v0, 0.0, 0.0, 1.0],
-        R=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        P=[fx, 0.0, u0, 0.0, 0.0, fy, v0, 0.0, 0.0, 0.0, 1.0, 0.0],
-    )
-    rest = StereoCalibration(
-        timestamp=timestamp(stamp_ns),
-        frame_id=optical_frame(camera),
-        parent_frame_id=BASE_FRAME,
-        baseline_m=calibration.baseline_m,
-        extrinsics=CameraExtrinsics(**{name: getattr(calibration, name) for name in _EXTRINSICS}),
-    )
-    return known, rest
-
-
-def read_calibration(known: bytes, rest: bytes) -> CameraCalibration:
-    """Join the two messages of `calibration_messages`.
-
-    Raises:
-        ValueError: the camera matrix is incomplete.
-        InputError: a value is impossible; the message names the field.
-    """
-    camera, stereo = CalibrationMessage.FromString(known), StereoCalibration.FromString(rest)
-    if len(camera.K) != 9:
-        raise ValueError(f"a camera matrix has {len(camera.K)} values")
-    return CameraCalibration(
-        **dict(zip(_INTRINSICS, (camera.K[0], camera.K[4], camera.K[2], camera.K[5]), strict=True)),
-        baseline_m=stereo.baseline_m,
-        **{name: getattr(stereo.extrinsics, name) for name in _EXTRINSICS},
-    )
 
 
 def motion_message(sample: MotionSample) -> Egomotion:

@@ -1,8 +1,7 @@
 """Contracts: what is expected of a recording, its topics, rates, gaps, latencies and values."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal, NamedTuple, Self
 
 import yaml
 from pydantic import Field, field_validator, model_validator
@@ -12,13 +11,26 @@ from semgrid_eval.faults import unknown_key
 from semgrid_eval.log.findings import Severity
 from semgrid_eval.log.quantities import quantities_of
 
-CAMERA = "{camera}"
-"""Stands for every camera of a log in the name of a topic."""
+CAMERA, STEREO, SINGLE = "{camera}", "{stereo}", "{single}"
+"""Stand in the name of a topic for every camera of a log, every one with disparity, and every one without."""
 Clock = Literal["log", "publish", "stamp"]
 _HEADER = """\
-# What `semgrid-eval check --spec` expects of a recording. What is left out is not checked; {camera} stands for every
-# camera of a log. Times are in seconds, or in periods: a period is the median step from message to message of a topic.
+# What `semgrid-eval check --spec` expects of a recording. What is left out is not checked. {camera} stands for every
+# camera of a log, {stereo} for every one with disparity, {single} for every one without. Times are in seconds, or in
+# periods: a period is the median step from message to message of a topic.
 """
+
+
+class Cameras(NamedTuple):
+    """The names of a log's cameras with disparity, and of those without."""
+
+    stereo: tuple[str, ...]
+    single: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All of them, sorted."""
+        return tuple(sorted((*self.stereo, *self.single)))
 
 
 class Range(Config):
@@ -125,6 +137,16 @@ def contract_text(contract: Contract) -> str:
     return _HEADER + text
 
 
-def topics_of(name: str, cameras: Mapping[str, object] | tuple[str, ...]) -> dict[str, str]:
-    """Return the topics that a name with `{camera}` stands for, by camera; itself by the empty name without."""
-    return {camera: name.replace(CAMERA, camera) for camera in cameras} if CAMERA in name else {"": name}
+def topics_of(name: str, cameras: Cameras) -> dict[str, str]:
+    """Return the topics that a name stands for, by camera; itself by the empty name where it stands for no camera's."""
+    for place, found in ((CAMERA, cameras.names), (STEREO, cameras.stereo), (SINGLE, cameras.single)):
+        if place in name:
+            return {camera: name.replace(place, camera) for camera in found}
+    return {"": name}
+
+
+def topic_beside(name: str, camera: str) -> str:
+    """Return the topic that a name stands for beside a topic of a camera."""
+    for place in (CAMERA, STEREO, SINGLE):
+        name = name.replace(place, camera)
+    return name

@@ -4,26 +4,25 @@ from functools import cache
 
 from semgrid_eval.labels import LAST_TRAIN_ID
 from semgrid_eval.log import topics
-from semgrid_eval.log.contract import CAMERA, Contract, Latency, Range, RangeBeside, TopicContract
+from semgrid_eval.log.contract import CAMERA, SINGLE, STEREO, Contract, Latency, Range, RangeBeside, TopicContract
 from semgrid_eval.log.findings import Severity
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.motion import LIMITS
 
 _ERROR = Severity.ERROR
-_DISPARITY, _LABEL, _IMAGE, _CALIBRATION, _STEREO = (
-    camera_topic(CAMERA, each)
-    for each in (topics.DISPARITY, topics.LABEL, topics.IMAGE, topics.CALIBRATION, topics.STEREO)
-)
+_CALIBRATION, _STEREO = (camera_topic(CAMERA, each) for each in (topics.CALIBRATION, topics.STEREO))
+_DISPARITY = camera_topic(STEREO, topics.DISPARITY)
+_SINGLE_FRAME = camera_topic(SINGLE, topics.CALIBRATION)  # which every frame has, whatever pictures
+_SINGLE_IMAGE = camera_topic(SINGLE, topics.IMAGE)
 _PICTURE = "foxglove.CompressedImage"
 _NEEDED = Range(low=1, severity=_ERROR)
-_WITH_DISPARITY = RangeBeside(topic=_DISPARITY, high=0)
 _STEADY = TopicContract(
     messages=_NEEDED,
     repeated_times=Range(high=0, severity=_ERROR),
     gap_periods=Range(high=1.5),
     jitter_periods=Range(high=0.2),
 )
-# What a road vehicle, and its stereo camera, can plausibly be.
+# What a road vehicle, and its cameras, can plausibly be.
 _MOTION = {
     **{name: Range(low=low, high=high, severity=_ERROR) for name, ((low, high), _) in LIMITS.items()},
     "acceleration_mps2": Range(low=-20, high=20),
@@ -45,7 +44,7 @@ _MOUNTING = {
 @cache
 def default_contract() -> Contract:
     """Return what is expected of any recording."""
-    motion = {"type": "semgrid.v1.Egomotion", "uncovered_s": _WITH_DISPARITY, "values": _MOTION}
+    motion = {"type": "semgrid.v1.Egomotion", "uncovered_s": RangeBeside(topic=_CALIBRATION, high=0), "values": _MOTION}
     disparity = {"type": _PICTURE, "values": {"valid_share": Range(low=0.02)}}
     return Contract(
         checksums=Severity.WARNING,
@@ -54,14 +53,21 @@ def default_contract() -> Contract:
         topics={
             topics.EGO_MOTION: _STEADY.model_copy(update=motion),
             _DISPARITY: _STEADY.model_copy(update=disparity),
-            _LABEL: TopicContract(type=_PICTURE, missing_beside=_WITH_DISPARITY),
-            _IMAGE: TopicContract(type=_PICTURE, missing_beside=_WITH_DISPARITY),
+            **_beside(_DISPARITY, STEREO),
+            _SINGLE_FRAME: _STEADY,
+            **_beside(_SINGLE_FRAME, SINGLE),
             _CALIBRATION: TopicContract(type="foxglove.CameraCalibration", messages=_NEEDED, values=_OPTICS),
             _STEREO: TopicContract(type="semgrid.v1.StereoCalibration", messages=_NEEDED, values=_MOUNTING),
         },
         # Motion is placed at its stamp, pictures at their log time: they must agree.
         latencies=tuple(
             Latency(topic=topic, seconds=Range(low=0, high=0, severity=_ERROR))
-            for topic in (topics.EGO_MOTION, _DISPARITY, _LABEL)
+            for topic in (topics.EGO_MOTION, _DISPARITY, _SINGLE_IMAGE, camera_topic(CAMERA, topics.LABEL))
         ),
     )
+
+
+def _beside(frames: str, cameras: str) -> dict[str, TopicContract]:
+    """Expect labels and images of some cameras at the times of all their frames."""
+    expected = TopicContract(type=_PICTURE, missing_beside=RangeBeside(topic=frames, high=0))
+    return {camera_topic(cameras, channel): expected for channel in (topics.LABEL, topics.IMAGE)}

@@ -25,11 +25,13 @@ _MOUNTING = ("baseline_m", "x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_ra
 _OPTICS = ("fx_px / width", "fy_px / fx_px", "u0_px / width", "v0_px / height", "fx_px", "fy_px", "u0_px", "v0_px")
 _VOID_ID = 255
 """Of pixels without a label in images of train ids; it is not one, so it does not count."""
+_SIZE = ("width_px", "height_px")
 _SWEEP = ("points", "range_m", "label_id")
 _OF_CHANNELS = {
     topics.CALIBRATION: _OPTICS,
     topics.STEREO: _MOUNTING,
-    topics.DISPARITY: ("valid_share", "width_px", "height_px"),
+    topics.DISPARITY: ("valid_share", *_SIZE),
+    topics.IMAGE: _SIZE,
     topics.LABEL: ("label_id",),
 }
 
@@ -39,7 +41,7 @@ def quantities_of(topic: str) -> tuple[str, ...]:
 
     `valid_share` is the part of a disparity image's pixels that have a disparity, `acceleration_mps2` the change of
     the speed from one message to the next, `points` how many a sweep has; the others are what messages say, or ratios
-    of that.
+    of that. The size of a camera's pictures is that of its disparity, of a single camera that of its images.
     """
     if topic == topics.EGO_MOTION:
         return (*_MOTION, "acceleration_mps2")
@@ -89,10 +91,11 @@ def camera_extents(log: LogReader, camera: str) -> Generator[Finding, None, Exte
             return found
     if size is not None:
         calibration = log.calibration(camera)
+        mounting = {name: value for name in _MOUNTING if (value := getattr(calibration, name)) is not None}
         found[camera_topic(camera, topics.CALIBRATION)] = _optics(calibration, size)
-        found[camera_topic(camera, topics.STEREO)] = {name: _one(getattr(calibration, name)) for name in _MOUNTING}
-        sizes = zip(("width_px", "height_px"), map(_one, size), strict=True)
-        found[camera_topic(camera, topics.DISPARITY)].update(sizes)
+        found[camera_topic(camera, topics.STEREO)] = {name: _one(value) for name, value in mounting.items()}
+        sized = camera_topic(camera, topics.IMAGE if calibration.baseline_m is None else topics.DISPARITY)
+        found.setdefault(sized, {}).update(zip(_SIZE, map(_one, size), strict=True))
     return found
 
 
@@ -126,8 +129,9 @@ def truth_faults(log: LogReader) -> Iterator[Finding]:
 
 
 def _frame_values(frame: CameraFrame) -> Iterator[tuple[str, str, Extent]]:
-    share = float((decode_gray(frame.disparity_png, bit_depth=16) > 0).mean())
-    yield topics.DISPARITY, "valid_share", _one(share)
+    if frame.disparity_png is not None:
+        share = float((decode_gray(frame.disparity_png, bit_depth=16) > 0).mean())
+        yield topics.DISPARITY, "valid_share", _one(share)
     if frame.label_png is not None:
         ids = decode_gray(frame.label_png, bit_depth=8)
         labelled = np.where(ids == _VOID_ID, 0, ids)

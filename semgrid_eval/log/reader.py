@@ -9,13 +9,15 @@ from typing import Any, NamedTuple, TypeVar
 
 from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.faults import not_one_of
-from semgrid_eval.log import codec, recovered, topics
+from semgrid_eval.log import calibrations, codec, recovered, topics
 from semgrid_eval.log.codec import CONDITIONS_RECORD, PLAYBACK_RECORD, PREDICTIONS_RECORD, RECORD, Scene
 from semgrid_eval.log.container import Container, damage_as_log_error
+from semgrid_eval.log.frames import FILES, Picture, camera_frames, picture_topics
 from semgrid_eval.log.recovered import Recovered
 from semgrid_eval.log.sweeps import read_sweep
 from semgrid_eval.log.topics import camera_topic, lidar_topic
 from semgrid_eval.recording import road_map
+from semgrid_eval.recording.colour import ImageSize
 from semgrid_eval.recording.lidar import LidarSweep
 from semgrid_eval.recording.road_map import RoadMap
 from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Quantity
@@ -42,15 +44,6 @@ _OTHERS = {
     PREDICTIONS_RECORD: "holds predictions, not a recording",
 }
 """What logs of this package are that are not recordings, by their metadata record."""
-
-
-class Picture(NamedTuple):
-    """A PNG file of a camera, or JPEG if in colour; `channel` is one of `topics.PICTURES`."""
-
-    stamp_ns: int
-    camera: str
-    channel: str
-    png: bytes
 
 
 class Decoded(NamedTuple):
@@ -148,12 +141,28 @@ class LogReader(Container):
             raise LogError(f"holds {count} messages, but its index states {self.message_count}", path=self.path)
 
     def calibration(self, camera: str) -> CameraCalibration:
-        """Return the calibration of a camera."""
+        """Return the calibration of a camera; one without baseline has no disparity either."""
         self.choose_camera(camera)
         known = self._first(camera_topic(camera, topics.CALIBRATION))
         rest = self._first(camera_topic(camera, topics.STEREO))
         with self._faults_at(camera_topic(camera, topics.CALIBRATION)):
-            return codec.read_calibration(known, rest)
+            found = calibrations.read_calibration(known, rest)
+        disparity = camera_topic(camera, topics.DISPARITY)
+        if found.baseline_m is None and disparity in self.schemas():
+            place = f"{camera_topic(camera, topics.STEREO)}: baseline_m"
+            raise LogError(f"is 0, and there is {disparity}", path=self.path, field=place)
+        return found
+
+    def image_size(self, camera: str) -> ImageSize:
+        """Return the size of pictures for which a camera is calibrated."""
+        topic = camera_topic(self.choose_camera(camera), topics.CALIBRATION)
+        known = self._first(topic)
+        with self._faults_at(topic):
+            return calibrations.read_size(known)
+
+    def is_single(self, camera: str) -> bool:
+        """Tell whether a camera has no disparity."""
+        return self.calibration(camera).baseline_m is None
 
     def motion(self) -> list[MotionSample]:
         """Return all that the vehicle reported of its motion, finite numbers, in the order of time."""
@@ -186,8 +195,9 @@ class LogReader(Container):
     def moments(self) -> Iterator[Moment]:
         """Iterate over all that the log holds, in the order of time.
 
-        A moment is all that has one stamp; motion belongs to the moment that comes next.
+        A moment is all that has one stamp; motion belongs to the moment that comes next. Frames are as `frames` says.
         """
+        single = {camera for camera in self.scene.cameras if self.is_single(camera)}
         shown = picture_topics(self.scene.cameras, topics.PICTURE_FIELDS)
         swept = {lidar_topic(lidar): lidar for lidar in self.lidars}
         decoders = {**_DECODERS, **dict.fromkeys(shown, codec.read_image), **dict.fromkeys(swept, read_sweep)}
@@ -200,23 +210,27 @@ class LogReader(Container):
             pictures = [Picture(stamp_ns, *shown[topic], value) for topic, value in found.items() if topic in shown]
             _, actors = found.get(topics.TRUE_ACTORS, (stamp_ns, None))
             sweeps = {swept[topic]: value for topic, value in found.items() if topic in swept}
-            yield Moment(stamp_ns, dict(camera_frames(pictures)), motion, found.get(topics.TRUE_POSE), actors, sweeps)
+            cameras = dict(camera_frames(pictures, single))
+            yield Moment(stamp_ns, cameras, motion, found.get(topics.TRUE_POSE), actors, sweeps)
 
     def pictures(self, cameras: Iterable[str], channels: Iterable[str]) -> Iterator[Picture]:
         """Iterate over the pictures of some channels of some cameras in the order of time."""
         wanted = picture_topics(cameras, channels)
-        for topic, stamp_ns, png in self._decoded(dict.fromkeys(wanted, codec.read_image)):
+        for topic, stamp_ns, png in self._decoded({topic: FILES[channel] for topic, (_, channel) in wanted.items()}):
             yield Picture(stamp_ns, *wanted[topic], png)
 
     def frames(self, camera: str, *, images: bool = False) -> Iterator[CameraFrame]:
         """Iterate over the frames of a camera in the order of time, one chunk of the file in memory at once.
 
-        Messages of equal stamps make a frame. A frame without label, or truth, has None there; one without disparity,
-        which could not be placed in the world, is left out. Colour images are read only where `images` says so.
+        Messages of equal stamps make a frame. A frame without label, or truth, has None there; one that lacks the
+        disparity that others of its camera have, which could not be placed in the world, is left out. Colour images are
+        read only where `images` says so.
         """
-        self.choose_camera(camera)
+        single = {camera} if self.is_single(camera) else set[str]()
         channels = [channel for channel in topics.PICTURE_FIELDS if images or channel != topics.IMAGE]
-        return (frame for _, frame in camera_frames(self.pictures([camera], channels)))
+        if single and not images:
+            channels.append(topics.CALIBRATION)  # which tells that there is a frame where no picture is read
+        return (frame for _, frame in camera_frames(self.pictures([camera], channels), single))
 
     def _decoded(self, decoders: Mapping[str, Callable[[bytes], Any]]) -> Iterator[Decoded]:
         """Iterate over what messages say; `decoders` maps topics to what reads their messages."""
@@ -261,11 +275,6 @@ class LogReader(Container):
         return entry.data
 
 
-def picture_topics(cameras: Iterable[str], channels: Iterable[str]) -> dict[str, tuple[str, str]]:
-    """Return camera and channel by topic."""
-    return {camera_topic(camera, channel): (camera, channel) for camera, channel in product(cameras, channels)}
-
-
 def _apart_from_motion(messages: Iterable[Decoded], motion: list[MotionSample]) -> Iterator[Decoded]:
     """Pass messages on, but move what they say of the motion to a list."""
     for message in messages:
@@ -273,19 +282,3 @@ def _apart_from_motion(messages: Iterable[Decoded], motion: list[MotionSample]) 
             motion.append(message.value)
         else:
             yield message
-
-
-def camera_frames(pictures: Iterable[Picture]) -> Iterator[tuple[str, CameraFrame]]:
-    """Make frames of pictures in the order of time: those of one camera and one stamp, and the camera's name.
-
-    A frame without label, image or truth has None there; one without disparity, which could not be placed in the
-    world, is left out.
-    """
-    for stamp_ns, of_one_time in groupby(pictures, key=lambda picture: picture.stamp_ns):
-        by_camera: dict[str, dict[str, bytes]] = {}
-        for picture in of_one_time:
-            by_camera.setdefault(picture.camera, {})[topics.PICTURE_FIELDS[picture.channel]] = picture.png
-        for camera, found in by_camera.items():
-            image_file, label_png = found.pop("image_file", None), found.pop("label_png", None)
-            if "disparity_png" in found:
-                yield camera, CameraFrame(stamp_ns, image_file=image_file, label_png=label_png, **found)

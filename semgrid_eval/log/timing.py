@@ -6,7 +6,7 @@ from itertools import pairwise
 from statistics import median, quantiles
 from typing import NamedTuple
 
-from semgrid_eval.log.contract import Clock, Contract, Latency, Range, TopicContract, topics_of
+from semgrid_eval.log.contract import Cameras, Clock, Contract, Latency, Range, TopicContract, topic_beside, topics_of
 from semgrid_eval.log.findings import Finding
 from semgrid_eval.log.topics import LABEL, camera_topic
 from semgrid_eval.words import plural
@@ -37,7 +37,7 @@ def timing(topic: str, expected: TopicContract, timeline: Timeline, camera: str)
     times_ns = _logged(timeline, topic)
     yield from judged(expected.messages, f"{topic}: messages", len(times_ns), f"has {plural(len(times_ns), 'message')}")
     if expected.missing_beside is not None:
-        (other,) = topics_of(expected.missing_beside.topic, (camera,)).values()
+        other = topic_beside(expected.missing_beside.topic, camera)
         wanted = set(_logged(timeline, other))
         count = len(wanted - set(times_ns))
         missing = "missing (`semgrid-eval segment` adds it)" if topic == camera_topic(camera, LABEL) else "missing"
@@ -46,7 +46,7 @@ def timing(topic: str, expected: TopicContract, timeline: Timeline, camera: str)
     yield from _steps(topic, expected, times_ns)
 
 
-def coverage(topic: str, expected: TopicContract, timeline: Timeline, cameras: tuple[str, ...]) -> Iterator[Finding]:
+def coverage(topic: str, expected: TopicContract, timeline: Timeline, cameras: Cameras) -> Iterator[Finding]:
     """Look for times of other topics before the first message of a topic or after its last."""
     times_ns, limit = _logged(timeline, topic), expected.uncovered_s
     if limit is None or not times_ns:
@@ -59,7 +59,7 @@ def coverage(topic: str, expected: TopicContract, timeline: Timeline, cameras: t
             yield from judged(limit, f"{topic}: uncovered_s", outside_s, text)
 
 
-def latencies(contract: Contract, timeline: Timeline, cameras: tuple[str, ...]) -> Iterator[Finding]:
+def latencies(contract: Contract, timeline: Timeline, cameras: Cameras) -> Iterator[Finding]:
     """Compare how long after something messages come with what is expected."""
     for expected in contract.latencies:
         for camera, topic in topics_of(expected.topic, cameras).items():
@@ -67,7 +67,7 @@ def latencies(contract: Contract, timeline: Timeline, cameras: tuple[str, ...]) 
 
 
 def _after(expected: Latency, camera: str) -> str | None:
-    return None if expected.after is None else next(iter(topics_of(expected.after, (camera,)).values()))
+    return None if expected.after is None else topic_beside(expected.after, camera)
 
 
 def _latency(expected: Latency, topic: str, after: str | None, timeline: Timeline) -> Iterator[Finding]:

@@ -12,6 +12,7 @@ from semgrid_eval import __version__
 from semgrid_eval.errors import InputError, located
 from semgrid_eval.labels import label_palette
 from semgrid_eval.log import codec, topics
+from semgrid_eval.log.calibrations import calibration_messages
 from semgrid_eval.log.container import MAX_STAMP_NS
 from semgrid_eval.log.sweeps import sweep_message
 from semgrid_eval.log.topics import camera_topic, lidar_topic
@@ -19,10 +20,12 @@ from semgrid_eval.motion import EgoMotion, implausible
 from semgrid_eval.recording.colour import ImageSize, read_size, require_whole
 from semgrid_eval.recording.lidar import LidarSweep
 from semgrid_eval.recording.png import read_header, require_pixels, with_palette
-from semgrid_eval.recording.types import CameraFrame, Moment, Recording
+from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment, Recording
 
 CHUNK_BYTES = 1 << 20
 LIBRARY = f"semgrid-eval/{__version__}"
+_CALIBRATED = (topics.DISPARITY, topics.IMAGE, topics.LABEL)
+"""Channels whose pictures have the size that a camera is calibrated for; the first that a frame has tells it."""
 
 
 def open_writer(stream: BinaryIO) -> Writer:
@@ -175,22 +178,26 @@ class MomentWriter:
             self._writer.write(topics.TRUE_ACTORS, codec.actors_message(now_ns, moment.actors), log_ns=now_ns)
 
     def _camera(self, camera: str, frame: CameraFrame) -> None:
-        size_px = self._whole(camera, topics.DISPARITY, frame.disparity_png, frame.stamp_ns)
         calibration = self._recording.calibrations[camera]
-        known, rest = codec.calibration_messages(frame.stamp_ns, camera, calibration, size_px)
+        with located(field=f"{self._recording.name}: camera {camera} at {frame.stamp_ns} ns"):
+            _require_sound(frame, calibration)
+        pictures = {
+            channel: png
+            for field, (channel, _) in topics.PICTURES.items()
+            if (png := getattr(frame, field)) is not None
+        }
+        sizes = {channel: self._whole(camera, channel, png, frame.stamp_ns) for channel, png in pictures.items()}
+        size_px = next(sizes[channel] for channel in _CALIBRATED if channel in sizes)
+        known, rest = calibration_messages(frame.stamp_ns, camera, calibration, size_px)
         self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
         self._writer.write(camera_topic(camera, topics.STEREO), rest, log_ns=frame.stamp_ns)
-        for picture, (channel, notes) in topics.PICTURES.items():
-            png: bytes | None = getattr(frame, picture)
-            if png is None:
-                continue
-            self._whole(camera, channel, png, frame.stamp_ns)
-            if channel in (topics.LABEL, topics.EXACT_LABEL):
-                png = with_palette(png, self._palette)
+        notes = dict(topics.PICTURES.values())
+        for channel, png in pictures.items():
+            shown = with_palette(png, self._palette) if channel in (topics.LABEL, topics.EXACT_LABEL) else png
             if channel == topics.IMAGE:
                 self._writer.end_chunk()
-            message = codec.image_message(frame.stamp_ns, camera, png)
-            self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes)
+            message = codec.image_message(frame.stamp_ns, camera, shown)
+            self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes[channel])
         self._writer.end_chunk()
 
     def _sweep(self, lidar: str, sweep: LidarSweep) -> None:
@@ -207,3 +214,14 @@ class MomentWriter:
                 return read_size(png) if self._recording.encoded_here else require_whole(png)
             header = read_header(png) if self._recording.encoded_here else require_pixels(png)
             return ImageSize(header.width, header.height)
+
+
+def _require_sound(frame: CameraFrame, calibration: CameraCalibration) -> None:
+    """Refuse disparity without a baseline, a baseline without disparity, and a frame of nothing."""
+    disparity = frame.disparity_png or frame.exact_disparity_png
+    if calibration.baseline_m is None and disparity is not None:
+        raise InputError("has disparity, but its calibration no baseline_m")
+    if calibration.baseline_m is not None and frame.disparity_png is None:
+        raise InputError("has no disparity; the calibration of a camera without has no baseline_m either")
+    if frame.disparity_png is frame.image_file is frame.label_png is None:
+        raise InputError("has neither disparity nor image nor labels")

@@ -7,6 +7,7 @@ from semgrid_eval.errors import LogError, located
 from semgrid_eval.grids.shown import frame_poses, shown_lidar
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log import codec, topics
+from semgrid_eval.log.calibrations import calibration_messages
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.playback.outgoing import Outgoing
@@ -69,7 +70,7 @@ class Backdrop:
             if calibrated.get(camera) != now_ns:
                 calibrated[camera] = now_ns
                 size_px = self._size_px(png, topic)
-                known, _ = codec.calibration_messages(now_ns, camera, self._calibrations[camera], size_px)
+                known, _ = calibration_messages(now_ns, camera, self._calibrations[camera], size_px)
                 yield Outgoing(now_ns, camera_topic(camera, topics.CALIBRATION), known)
             yield Outgoing(now_ns, topic, codec.image_message(now_ns, camera, png), notes=notes[channel])
 

@@ -14,7 +14,7 @@ from semgrid_eval.recording.lidar import LidarSweep
 
 @dataclass(frozen=True)
 class CameraCalibration:
-    """A stereo camera as Cityscapes describes it.
+    """A camera as Cityscapes describes its stereo camera.
 
     Focal lengths and principal point are in pixels of the source image. Position and angles place the camera in the
     ISO 8855 vehicle frame (x forward, y left, z up, origin on the ground under the rear axle); the angles are those of
@@ -25,7 +25,7 @@ class CameraCalibration:
     fy_px: float
     u0_px: float
     v0_px: float
-    baseline_m: float
+    baseline_m: float | None  # to the right camera of the pair; None of a single camera, which has no disparity
     x_m: float
     y_m: float
     z_m: float
@@ -34,13 +34,20 @@ class CameraCalibration:
     yaw_rad: float
 
     def __post_init__(self) -> None:
-        for entry in fields(self):
-            value = getattr(self, entry.name)
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        if self.baseline_m is None:
+            del values["baseline_m"]
+        for name, value in values.items():
             if not math.isfinite(value):
-                raise InputError(f"{value} is not a finite number", field=entry.name)
-        for name in ("fx_px", "fy_px", "baseline_m"):
-            if getattr(self, name) <= 0:
-                raise InputError(f"{getattr(self, name)} is not positive", field=name)
+                raise InputError(f"{value} is not a finite number", field=name)
+            if name in ("fx_px", "fy_px", "baseline_m") and value <= 0:
+                raise InputError(f"{value} is not positive", field=name)
+
+    @property
+    def depth_disparity_m_px(self) -> float:
+        """Depth times disparity, f B, of a camera that has disparity."""
+        assert self.baseline_m is not None, "whoever asks has seen that it has disparity"
+        return self.fx_px * self.baseline_m
 
     @property
     def ego_from_camera(self) -> SE3:
@@ -88,12 +95,13 @@ class Actor:
 class CameraFrame:
     """One moment of one camera; images are files as bytes, untouched, all of one size: PNG, or JPEG if in colour.
 
-    Disparity is 16 bit: d_px = (p - 1) / 256 and p = 0 is invalid. Labels are 8-bit Cityscapes label ids.
+    Disparity is 16 bit: d_px = (p - 1) / 256 and p = 0 is invalid. All frames of a camera with a baseline have it, and
+    none of a single camera, which has an image or labels. Labels are 8-bit Cityscapes label ids.
     """
 
     stamp_ns: int
     image_file: bytes | None
-    disparity_png: bytes
+    disparity_png: bytes | None
     label_png: bytes | None
     exact_label_png: bytes | None = None  # truth: labels without the errors of a segmentation network
     exact_disparity_png: bytes | None = None  # truth: disparity of the exact depth, coded like disparity

@@ -2,21 +2,24 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
 import torch
 
-from semgrid_eval.errors import InputError
+from semgrid_eval.errors import InputError, LogError
 from semgrid_eval.executors import Executor
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.build import GridDataSet, build_grids
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.fingerprint import kept_fingerprints
+from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.progress import Stage
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.results import LogRecord
+from semgrid_eval.sensors.kinds import misfit
 from semgrid_eval.sources.benchmarks import published_fingerprints
 from semgrid_eval.windows.grids import GridData, stack_recordings
 from semgrid_eval.windows.storage import Storage
@@ -107,6 +110,8 @@ class RunData:
     def grids(self, config: GridConfig) -> GridDataSet:
         """Return the grids of all recordings, on disk."""
         key = grid_digest(config)
+        if key not in self._sets and (misfits := self._misfits(config)):
+            self._sets[key] = GridDataSet(failed=misfits)  # which is the rows' fault: no log is to be told of
         if key not in self._sets:
             with self._stage("grids") as progress:
                 data_set = build_grids(
@@ -139,6 +144,18 @@ class RunData:
                     recovered=recording.recovered,
                 )
         return self._sets[key]
+
+    def _misfits(self, config: GridConfig) -> dict[str, str]:
+        """Say of each log why it cannot have what a grid's sensors look at; nothing where one may, or is damaged."""
+        found = {}
+        for log in self._logs:
+            fault = None
+            with suppress(LogError), LogReader(log) as reader:
+                fault = misfit(reader, config.sensors.values())
+            if fault is None:
+                return {}
+            found[str(log)] = fault
+        return found
 
     def _why_none(self, data_set: GridDataSet, split: str) -> str:
         """Say why there are no grids of a split: of the reasons for which all logs failed, the first."""

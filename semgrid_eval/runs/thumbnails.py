@@ -15,13 +15,12 @@ from semgrid_eval.grids.shown import frame_poses, shown_camera, shown_lidar
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.labels import label_palette
 from semgrid_eval.log import topics
-from semgrid_eval.log.container import damage_as_log_error
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import camera_topic
 from semgrid_eval.progress import Stage
 from semgrid_eval.recording.colour import decode_colour
 from semgrid_eval.recording.panorama import panorama_png
-from semgrid_eval.recording.png import decode_ids, encode_gray, read_header, with_palette
+from semgrid_eval.recording.png import decode_ids, encode_gray, with_palette
 from semgrid_eval.recording.resizing import nearest
 from semgrid_eval.scores.thumbnails import (
     FramePictures,
@@ -175,15 +174,14 @@ def _track(reader: LogReader, grid: GridConfig, camera: str | None) -> Track:
         start_ns=reader.start_ns,
         stamps_ns=np.array([pose.stamp_ns for pose in poses], np.int64),
         poses=np.array([(pose.x_m, pose.y_m, pose.yaw_rad) for pose in poses], np.float64).reshape(-1, 3),
-        projection=np.zeros((3, 4)) if camera is None else _projection(reader, camera),
+        projection=_projection(reader, camera),
     )
 
 
-def _projection(reader: LogReader, camera: str) -> NDArray[np.float64]:
-    first = next(reader.pictures([camera], [topics.DISPARITY]))
-    with damage_as_log_error(reader.path):
-        header = read_header(first.png)
-    return unit_projection(reader.calibration(camera), (header.width, header.height))
+def _projection(reader: LogReader, camera: str | None) -> NDArray[np.float64]:
+    if camera is None:
+        return np.zeros((3, 4))
+    return unit_projection(reader.calibration(camera), reader.image_size(camera))
 
 
 def _requests(run: Path, windows: Iterable[tuple["WindowSet", GridConfig]]) -> list[Request]:

@@ -15,6 +15,7 @@ from semgrid_eval.sensors.sensor import Points, SensorConfig
 
 if TYPE_CHECKING:
     from semgrid_eval.log.reader import LogReader
+    from semgrid_eval.recording.types import CameraCalibration
 
 _SIZE_PX = (16, 8192)
 
@@ -75,13 +76,31 @@ def read_cameras(
     by_camera: dict[str, dict[str, CameraSensor]] = {}
     for name, sensor in sensors.items():
         by_camera.setdefault(log.choose_camera(sensor.camera), {})[name] = sensor
+    for camera in by_camera:
+        require_disparity(log, camera)
     streams = [_read_camera(log, camera, parts, class_by_label) for camera, parts in by_camera.items()]
     return heapq.merge(*streams, key=lambda points: points.stamp_ns)
 
 
 def camera_frames(log: "LogReader", sensor: CameraSensor) -> str:
-    """Return the topic of what every frame of a sensor's camera has; a LogError says that there is no such camera."""
-    return camera_topic(log.choose_camera(sensor.camera), DISPARITY)
+    """Return the topic of what every frame of a sensor's camera has.
+
+    Raises:
+        LogError: there is no such camera, or it has no disparity.
+    """
+    camera = log.choose_camera(sensor.camera)
+    require_disparity(log, camera)
+    return camera_topic(camera, DISPARITY)
+
+
+def require_disparity(log: "LogReader", camera: str) -> "CameraCalibration":
+    """Return the calibration of a camera; a LogError says that it has no disparity, and what it can do without."""
+    calibration = log.calibration(camera)
+    if calibration.baseline_m is None:
+        advice = f"it can colour a LiDAR's points: {{kind: lidar, colour_from: {{camera: {camera}}}}}"
+        fault = f"has no disparity, so nothing tells where in a grid its pixels belong; {advice}"
+        raise LogError(fault, path=log.path, field=f"camera {camera}")
+    return calibration
 
 
 def _read_camera(
@@ -105,6 +124,7 @@ def _read_camera(
         if not frame.label_png:
             place = f"frame at {frame.stamp_ns} ns"
             raise LogError("has no label image; `semgrid-eval segment` adds them", field=place)
+        assert frame.disparity_png is not None, "all frames of a camera with a baseline have disparity"
         with located(field=f"{camera_topic(camera, DISPARITY)} at {frame.stamp_ns} ns", kind=LogError):
             disparity = decode_gray(frame.disparity_png, bit_depth=16)
         with located(field=f"{camera_topic(camera, LABEL)} at {frame.stamp_ns} ns", kind=LogError):

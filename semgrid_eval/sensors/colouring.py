@@ -1,6 +1,7 @@
-"""Labels of a LiDAR's points by the label images of a camera that sees them."""
+"""Labels of a LiDAR's points by the label images of cameras that see them."""
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import cv2
@@ -8,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import LogError, located
-from semgrid_eval.log.topics import DISPARITY, LABEL, camera_topic
+from semgrid_eval.log.topics import LABEL, camera_topic
 from semgrid_eval.motion import EgoMotion
-from semgrid_eval.recording.png import decode_gray, read_header
+from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.sensors.projection import unit_projection
 
 if TYPE_CHECKING:
@@ -27,14 +28,33 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Coloured:
-    """Label ids of points, and whether the camera sees them at all: both (N,)."""
+    """Label ids of points, and whether a camera sees them at all: both (N,)."""
 
     label_id: NDArray[np.uint8]
     seen: Flags
 
+    def over(self, other: "Coloured") -> "Coloured":
+        """Return the same, with what another camera sees beside it."""
+        return Coloured(np.where(self.seen, self.label_id, other.label_id), self.seen | other.seen)
+
 
 class Colouring:
-    """Gives the points of one LiDAR, sweep after sweep in the order of time, the labels of a camera's pixels.
+    """Gives the points of one LiDAR, sweep after sweep in the order of time, the labels of cameras' pixels.
+
+    A point has the label of the first camera that sees it; errors are those of `CameraColouring`.
+    """
+
+    def __init__(self, log: "LogReader", settings: "ColourFrom") -> None:
+        motion = EgoMotion(log.motion(), "arc")
+        self._cameras = [CameraColouring(log, camera, settings, motion) for camera in settings.cameras]
+
+    def colour(self, stamp_ns: int, place_m: Floats) -> Coloured:
+        """Colour points (N, 3) in the vehicle frame of a time."""
+        return reduce(Coloured.over, (each.colour(stamp_ns, place_m) for each in self._cameras))
+
+
+class CameraColouring:
+    """Gives points the labels of one camera's pixels.
 
     Points are moved by the vehicle's motion to the time of the label image that is nearest to their sweep, of two that
     are equally near the earlier. What moves itself is not where it was then.
@@ -43,11 +63,11 @@ class Colouring:
         LogError: there is no such camera, a label image is missing or damaged.
     """
 
-    def __init__(self, log: "LogReader", settings: "ColourFrom") -> None:
+    def __init__(self, log: "LogReader", camera: str | None, settings: "ColourFrom", motion: EgoMotion) -> None:
         self._path, self._settings = log.path, settings
-        self._camera = log.choose_camera(settings.camera)
-        self._calibration = log.calibration(self._camera)
-        self._motion = EgoMotion(log.motion(), "arc")
+        self._camera = log.choose_camera(camera)
+        self._projection = unit_projection(log.calibration(self._camera), log.image_size(self._camera))
+        self._motion = motion
         self._frames = log.frames(self._camera)
         self._nearest, self._next = next(self._frames, None), next(self._frames, None)
 
@@ -78,20 +98,16 @@ class Colouring:
             place = f"frame of {self._camera} at {frame.stamp_ns} ns"
             message = "has no label image to colour points by; `semgrid-eval segment` adds them"
             raise LogError(message, path=self._path, field=place)
-        with located(field=self._place(LABEL, frame), path=self._path, kind=LogError):
+        place = f"{camera_topic(self._camera, LABEL)} at {frame.stamp_ns} ns"
+        with located(field=place, path=self._path, kind=LogError):
             return decode_gray(frame.label_png, bit_depth=8)
 
     def _projected(self, frame: "CameraFrame", stamp_ns: int, place_m: Floats) -> Floats:
         """Return u, v in images whose sides are 1 long, times depth, and depth (m): (3, N)."""
-        with located(field=self._place(DISPARITY, frame), path=self._path, kind=LogError):
-            header = read_header(frame.disparity_png)
         now, then = (self._motion.odom_from_vehicle(each) for each in (stamp_ns, frame.stamp_ns))
         moved_m = now.seen_from(then).apply(place_m[:, :2])
         points = np.column_stack([moved_m, place_m[:, 2], np.ones(len(place_m))])
-        return np.asarray(unit_projection(self._calibration, (header.width, header.height)) @ points.T, np.float64)
-
-    def _place(self, channel: str, frame: "CameraFrame") -> str:
-        return f"{camera_topic(self._camera, channel)} at {frame.stamp_ns} ns"
+        return np.asarray(self._projection @ points.T, np.float64)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, SerializeAsAny, StringConstraints
 
 from semgrid_eval.classes import NO_POINT
 from semgrid_eval.config import of_kind
+from semgrid_eval.errors import LogError
 from semgrid_eval.log.topics import TRUE_ACTORS
 from semgrid_eval.sensors.camera import CameraSensor, camera_frames, read_cameras
 from semgrid_eval.sensors.lidar import LidarSensor, lidar_sweeps, read_lidars
@@ -64,6 +65,17 @@ def times_of(log: "LogReader", sensor: SensorConfig) -> Iterator[int]:
         points = kind.read(log, {sensor.kind: sensor}, np.full(256, NO_POINT, np.uint8))
         return (each.stamp_ns for each in points)
     return (stamp_ns for _, stamp_ns, _, _ in log.messages([kind.topic(log, sensor)]))
+
+
+def misfit(log: "LogReader", sensors: Iterable[SensorConfig]) -> str | None:
+    """Say why a log cannot have what sensors look at, before anything is looked at; None where it may."""
+    try:
+        for sensor in sensors:
+            if (topic := KINDS[sensor.kind].topic) is not None:
+                topic(log, sensor)
+    except LogError as error:
+        return str(error)
+    return None
 
 
 def synchronise(

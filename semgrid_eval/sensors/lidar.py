@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from semgrid_eval.classes import NO_POINT
 from semgrid_eval.config import Config
 from semgrid_eval.errors import LogError
+from semgrid_eval.faults import shown
 from semgrid_eval.log.topics import lidar_topic
 from semgrid_eval.sensors.sensor import Morphology, Points, SensorConfig
 
@@ -20,11 +21,26 @@ if TYPE_CHECKING:
 
 
 class ColourFrom(Config):
-    """Which camera's label images colour points, and which of its pixels."""
+    """Which cameras' label images colour points, and which of their pixels."""
 
-    camera: str | None = None  # its name in the log; None takes a log's only one
+    # Its name in the log, or names: a point has the label of the first that sees it. None takes a log's only one.
+    camera: str | tuple[str, ...] | None = None
     within_s: float = Field(0.1, ge=0.0, le=1.0)  # of a sweep, before or after it: the nearest label image in that time
     occlusion_px: int = Field(4, ge=0, le=64)  # how far beside a point, in pixels of the label image, another hides it
+
+    @field_validator("camera", mode="before")
+    @classmethod
+    def _is_named(cls, value: object) -> object:
+        if value is None or isinstance(value, str):
+            return value
+        if isinstance(value, list | tuple) and value and all(isinstance(name, str) for name in value):
+            return tuple(value)
+        raise ValueError(f"must be a name or a list of names, not {shown(value)}")
+
+    @property
+    def cameras(self) -> tuple[str | None, ...]:
+        """The cameras in their order; None is a log's only one."""
+        return self.camera if isinstance(self.camera, tuple) else (self.camera,)
 
 
 class LidarSensor(SensorConfig):
@@ -35,7 +51,7 @@ class LidarSensor(SensorConfig):
     # The paper's kernels close gaps of one cell and then delete what is less than four cells wide. Rings on the ground
     # are one cell wide and farther apart than that, from some 15 m on for 64 rings: so nothing is done by default.
     morphology: Morphology | None = Field("off")
-    # The camera whose label images colour the points. None takes the points' own labels, and is not written, so that
+    # The cameras whose label images colour the points. None takes the points' own labels, and is not written, so that
     # grids of these keep their digests.
     colour_from: ColourFrom | None = Field(None, exclude_if=lambda value: value is None)
 
@@ -52,7 +68,9 @@ def read_lidars(
 
 
 def lidar_sweeps(log: "LogReader", sensor: LidarSensor) -> str:
-    """Return the topic of a sensor's sweeps; a LogError says that there is no such LiDAR."""
+    """Return the topic of a sensor's sweeps; a LogError says that there is no such LiDAR, or no camera to colour it."""
+    for camera in sensor.colour_from.cameras if sensor.colour_from else ():
+        log.choose_camera(camera)
     return lidar_topic(log.choose_lidar(sensor.lidar))
 
 

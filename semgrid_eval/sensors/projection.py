@@ -46,7 +46,7 @@ class Projection:
         self._exclusion = exclusion
         self._slopes: dict[tuple[int, ...], Floats] = {}
         self._origin_m = np.array([calibration.x_m, calibration.y_m])
-        self._depth_disparity_m_px = calibration.fx_px * calibration.baseline_m  # at the disparity's own resolution
+        self._depth_disparity_m_px = calibration.depth_disparity_m_px  # at the disparity's own resolution
 
     def points(self, disparity: Image, label: Image) -> Pixels:
         """Project source images (h, w).

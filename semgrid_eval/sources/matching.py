@@ -20,7 +20,7 @@ class SemiGlobalMatching:
     """Matches the pairs of one camera; the left `margin_px` columns, which the right camera hardly sees, stay blank."""
 
     def __init__(self, calibration: CameraCalibration) -> None:
-        farthest_px = calibration.fx_px * calibration.baseline_m / NEAREST_M
+        farthest_px = calibration.depth_disparity_m_px / NEAREST_M
         self.margin_px = 16 * math.ceil(farthest_px / 16)
         self._matching = cv2.StereoSGBM.create(
             minDisparity=0,

@@ -24,7 +24,7 @@ from semgrid_eval.recording.disparity import coded_disparity
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.recording.types import CameraFrame
 from semgrid_eval.segmentation.network import SegmentationNetwork
-from semgrid_eval.sensors.camera import CameraSensor
+from semgrid_eval.sensors.camera import CameraSensor, require_disparity
 from semgrid_eval.sensors.projection import Projection
 from semgrid_eval.sensors.sensor import Points
 from semgrid_eval.sources.matching import SemiGlobalMatching
@@ -77,7 +77,7 @@ class LiveLog:
     def __init__(self, log: LogReader, chain: Chain) -> None:
         self._log, self._chain = log, chain
         self.camera = log.choose_camera(_SENSOR.camera)
-        calibration = log.calibration(self.camera)
+        calibration = require_disparity(log, self.camera)
         self._projection = Projection(calibration, _SENSOR.image_size_px, GRID.class_by_label())
         self._matching = SemiGlobalMatching(calibration)
         self._right = RightImages(chain.right, log, self.camera) if chain.right else None
@@ -119,9 +119,8 @@ class LiveLog:
             png = self._needed(frame.label_png, "label image; `semgrid-eval segment` adds them", frame)
             label = decode_gray(png, bit_depth=8, path=self._log.path).astype(np.uint8, copy=False)
         if self._right is None:
-            disparity = decode_gray(frame.disparity_png, bit_depth=16, path=self._log.path).astype(
-                np.uint16, copy=False
-            )
+            png = self._needed(frame.disparity_png, "disparity", frame)
+            disparity = decode_gray(png, bit_depth=16, path=self._log.path).astype(np.uint16, copy=False)
         if self.needs_colour:
             left = decode_colour(self._needed(frame.image_file, "colour image", frame), path=self._log.path)
         return _Pictures(label, disparity, left, None if right_png is None else decode_colour(right_png))

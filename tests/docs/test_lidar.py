@@ -21,6 +21,7 @@ from semgrid_eval.sources.kitti.labels import CLASSES
 
 PAGE = text_of("docs/lidar.md")
 LIDAR, TRACKS = "logs", "drives"
+RING_CAMERAS = ("ring_front_center", "ring_side_left", "ring_side_right")
 COMMANDS = [line for line in commands(PAGE) if line.startswith("semgrid-eval ")]
 MATRICES = [block for block in blocks("yaml", PAGE) if "\nrows:" in block]
 
@@ -65,12 +66,14 @@ def test_commands_for_argoverse(workplace):
     from support.argoverse_log import write_argoverse
     from support.onnx_models import colour_network
 
-    write_argoverse(workplace / "SRC", frames=14, stereo=True)
+    write_argoverse(workplace / "SRC", frames=14, stereo=True, ring=True)
     colour_network(Path("network.onnx"), colours={0: (0.5, 0.5, 0.5), 11: (1.0, 0.0, 0.0)})
     Path("tracks.yaml").write_text(MATRICES[1].replace("[1, 2, 3]", "[3]"))
     run(TRACKS)
     with LogReader(Path("labelled/val/drive.mcap")) as labelled:
-        assert all(frame.label_png for frame in labelled.frames("stereo_front_left"))
+        assert labelled.scene.cameras == ("ring_front_center", "ring_rear_left", "stereo_front_left")
+        for camera in labelled.scene.cameras:
+            assert all(frame.label_png for frame in labelled.frames(camera))
     exec(blocks("python", PAGE)[0], {})
     assert [path.name for path in Path("wrong/val").iterdir()] == ["drive.mcap"]
     rows = read_run(Path("runs/tracks")).rows
@@ -79,9 +82,10 @@ def test_commands_for_argoverse(workplace):
 
 def test_other_settings_of_the_page_are_valid():
     others = [yaml.safe_load(each)["grid"] for each in blocks("yaml", PAGE) if "\nrows:" not in each]
-    both, coloured = (parse_config(GridConfig, each) for each in others)
+    both, coloured, ring = (parse_config(GridConfig, each) for each in others)
     assert both.target_row == "top+left"
     assert coloured.sensors["top"].colour_from == ColourFrom(camera="left", within_s=0.1, occlusion_px=4)
+    assert ring.sensors["top"].colour_from.cameras == RING_CAMERAS
 
 
 @pytest.mark.parametrize(

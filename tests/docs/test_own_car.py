@@ -105,7 +105,8 @@ def test_the_short_map_of_the_page_converts_the_bag(workplace):
 def test_the_long_map_of_the_page_is_one(workplace):
     (workplace / "long.yaml").write_text(YAML[1])
     found = load_map(workplace / "long.yaml")
-    assert (list(found.cameras), list(found.lidars)) == (["front", "rear"], ["top"])
+    assert (list(found.cameras), list(found.lidars)) == (["front", "rear", "side"], ["top"])
+    assert found.single == {"side"}
 
 
 def test_what_the_page_says_is_refused_is_what_the_tests_of_bags_expect():

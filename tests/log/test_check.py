@@ -121,7 +121,7 @@ def test_repeated_time_is_an_error(tmp_path):
 
 def test_frames_outside_the_time_of_the_motion_are_a_warning(tmp_path):
     found = findings(tmp_path, lambda number, moment: replace(moment, motion=()) if number == 7 else moment)
-    text = "leaves out 0.059 s of the time of /camera/front/disparity (allowed: at most 0)"
+    text = "leaves out 0.059 s of the time of /camera/front/calibration (allowed: at most 0)"
     assert found == {"/ego/motion: uncovered_s": (Severity.WARNING, text)}
 
 

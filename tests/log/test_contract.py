@@ -1,6 +1,6 @@
 import pytest
 
-from semgrid_eval.log.contract import Contract, Range, contract_text, load_contract, topics_of
+from semgrid_eval.log.contract import Cameras, Contract, Range, contract_text, load_contract, topic_beside, topics_of
 from semgrid_eval.log.default_contract import default_contract
 from semgrid_eval.motion import SPEED_MPS
 
@@ -39,5 +39,13 @@ def test_a_range_holds_its_ends_and_no_nan(limit, inside, outside, text):
 
 
 def test_a_name_with_camera_stands_for_every_camera():
-    assert topics_of("/camera/{camera}/label", ("a", "b")) == {"a": "/camera/a/label", "b": "/camera/b/label"}
-    assert topics_of("/tf", ("a", "b")) == {"": "/tf"}
+    cameras = Cameras(("b",), ("a",))
+    assert topics_of("/camera/{camera}/label", cameras) == {"a": "/camera/a/label", "b": "/camera/b/label"}
+    assert topics_of("/camera/{stereo}/label", cameras) == {"b": "/camera/b/label"}
+    assert topics_of("/camera/{single}/label", cameras) == {"a": "/camera/a/label"}
+    assert topics_of("/tf", cameras) == {"": "/tf"}
+
+
+@pytest.mark.parametrize("place", ["{camera}", "{stereo}", "{single}"])
+def test_beside_a_camera_a_name_stands_for_its_own_topic(place):
+    assert topic_beside(f"/camera/{place}/image", "a") == "/camera/a/image"

@@ -1,9 +1,10 @@
 import pytest
 
-from semgrid_eval.log.contract import Contract, Latency, Range, RangeBeside, TopicContract
+from semgrid_eval.log.contract import Cameras, Contract, Latency, Range, RangeBeside, TopicContract
 from semgrid_eval.log.timing import Times, coverage, latencies, timing
 
 MS = 1_000_000
+NONE = Cameras((), ())
 
 
 def at(*times_ms, delay_ms=0, stamp_ms=0):
@@ -45,7 +46,7 @@ def test_a_topic_without_messages_has_only_their_number_wrong():
     expected = TopicContract(messages=Range(low=1), rate_hz=Range(low=1), gap_s=Range(high=1), uncovered_s=beside("/b"))
     timeline = {"/b": at(0, 100)}
     assert [place for place, _ in told(timing("/a", expected, timeline, ""))] == ["/a: messages"]
-    assert told(coverage("/a", expected, timeline, ())) == []
+    assert told(coverage("/a", expected, timeline, NONE)) == []
 
 
 def beside(topic):
@@ -64,7 +65,7 @@ def test_messages_missing_beside_others_are_counted_for_the_same_camera():
 def test_time_that_is_not_covered(times_ms, outside):
     expected = TopicContract(uncovered_s=beside("/camera/{camera}/a"))
     timeline = {"/m": at(*times_ms), "/camera/x/a": at(0, 300)}
-    found = told(coverage("/m", expected, timeline, ("x", "none")))
+    found = told(coverage("/m", expected, timeline, Cameras(("x", "none"), ())))
     text = f"leaves out {outside} s of the time of /camera/x/a (allowed: at most 0)"
     assert found == ([("/m: uncovered_s", text)] if outside else [])
 
@@ -84,11 +85,11 @@ def test_time_that_is_not_covered(times_ms, outside):
 def test_latency_by_any_clock_and_after_any_topic(latency, message):
     timeline = {"/a": at(100, 200, 300, delay_ms=50, stamp_ms=20), "/b": at(115, 220)}
     contract = Contract(latencies=(Latency(**latency, seconds=Range(high=0)),))
-    (found,) = told(latencies(contract, timeline, ()))
+    (found,) = told(latencies(contract, timeline, NONE))
     assert found[0] == f"{latency['topic']}: latency"
     assert found[1].startswith(message)
     contract = Contract(latencies=(Latency(**latency, seconds=Range(low=0)),))
-    assert told(latencies(contract, timeline, ())) == []
+    assert told(latencies(contract, timeline, NONE)) == []
 
 
 def test_latency_is_between_topics_of_one_camera():
@@ -96,9 +97,9 @@ def test_latency_is_between_topics_of_one_camera():
         latencies=(Latency(topic="/{camera}/b", after="/{camera}/a", after_clock="log", seconds=Range(high=0.01)),)
     )
     timeline = {"/x/a": at(100), "/x/b": at(105), "/y/a": at(100), "/y/b": at(120)}
-    assert [place for place, _ in told(latencies(contract, timeline, ("x", "y")))] == ["/y/b: latency"]
+    assert [place for place, _ in told(latencies(contract, timeline, Cameras(("x",), ("y",))))] == ["/y/b: latency"]
 
 
 def test_messages_without_stamp_have_no_latency():
     contract = Contract(latencies=(Latency(topic="/a", seconds=Range(high=0)),))
-    assert told(latencies(contract, {"/a": [Times(5, 6, None)]}, ())) == []
+    assert told(latencies(contract, {"/a": [Times(5, 6, None)]}, NONE)) == []

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 import torch
-from support.small_runs import run, write_logs
+from support.small_runs import SPLITS, run, write_logs
 from support.toy_world import street
 
 from semgrid_eval.classes import CLASS_NAMES
@@ -265,13 +265,24 @@ def test_logs_too_short_for_a_window_are_named(logs, tmp_path):
     assert record.failed_logs == {"short.mcap": "short.mcap: has 5 frames, and a window needs 9"}
 
 
-def test_where_no_log_gives_grids_the_row_says_why(logs, tmp_path):
+def test_where_no_log_has_what_a_row_looks_at_the_row_says_so_and_no_log_is_at_fault(logs, tmp_path):
     grid = {"sensors": {"top": {"kind": "lidar"}}, "target": ["top"]}
-    record = run([{"name": "BL-DC", "model": "newest", "grid": grid}], logs, tmp_path / "run")
-    log, reason = min(record.failed_logs.items())
-    assert reason == f"{log}: lidar: the log has none"
-    count = len(record.failed_logs)
-    assert record.rows[0].failure == f"none of the logs ({count}) gave grids; the first fails by: {reason}"
+    rows = [{"name": "BL-DC", "model": "newest", "grid": grid}, {"name": "BL-Fuse", "model": "fuse"}]
+    record = run(rows, logs, tmp_path / "run")
+    reason = "train/toy0.mcap: lidar: the log has none"
+    told = f"none of the logs ({len(SPLITS)}) gave grids; the first fails by: {reason}"
+    assert [row.failure for row in record.rows] == [told, None]
+    assert record.failed_logs == {}
+
+
+def test_where_every_log_is_damaged_the_row_says_so_and_each_is_named(logs, tmp_path):
+    whole = next((logs / "val").iterdir()).read_bytes()
+    (tmp_path / "logs").mkdir()
+    for name in ("a", "b"):
+        (tmp_path / "logs" / f"{name}.mcap").write_bytes(whole[:5000])
+    record = run([{"name": "BL-DC", "model": "newest"}], tmp_path / "logs", tmp_path / "run")
+    assert record.rows[0].failure.startswith("none of the logs (2) gave grids; the first fails by: a.mcap: ")
+    assert list(record.failed_logs) == ["a.mcap", "b.mcap"]
 
 
 def test_a_damaged_log_is_named_by_its_place_and_the_others_are_scored(logs, tmp_path):

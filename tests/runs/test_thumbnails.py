@@ -8,6 +8,7 @@ import pytest
 import yaml
 from PIL import Image
 from support.own_clock import with_own_motion
+from support.single import RIG, single_rig
 from support.toy_world import FRAME_NS, HEIGHT, START_NS, WIDTH, png, street
 
 from semgrid_eval.errors import InputError, LogError
@@ -28,6 +29,7 @@ from semgrid_eval.runs.thumbnails import log_pictures, small_image, small_label
 from semgrid_eval.scores import results
 from semgrid_eval.scores.thumbnails import FramePictures, pictures_file, read_pictures
 from semgrid_eval.sensors.camera import CameraSensor
+from semgrid_eval.sensors.lidar import ColourFrom, LidarSensor
 
 SHORT = {"name": "BL-DC", "model": "newest", "window": {"step_frames": 3, "target_frame": 8}}
 LONG = {"name": "BL-late", "model": "newest", "window": {"step_frames": 2, "target_frame": 8, "horizon_steps": 2}}
@@ -252,3 +254,28 @@ def test_a_log_that_is_damaged_after_its_grids_were_built_costs_no_result(logs, 
     assert len(results.read_result(results.result_folder(tmp_path / "second", record.rows[0].results[0])).windows) == 2
     assert len(files(tmp_path / "second")) == 1
     assert [text for text in caplog.messages if text.startswith(f"{log}: is damaged")]
+
+
+def test_a_camera_without_disparity_gives_the_same_pictures_and_projection(tmp_path):
+    grid = GridConfig(sensors={"top": LidarSensor(colour_from=ColourFrom(camera="left"))}, target=("top",))
+    stereo = replace(single_rig(frames=4), calibrations={name: WORLD.calibration(name) for name in WORLD.cameras})
+    stereo = replace(stereo, moments=lambda: _with_disparity(single_rig(frames=4).moments()))
+    kept = []
+    for name, recording in (("single", single_rig(frames=4)), ("stereo", stereo)):
+        path = tmp_path / f"{name}.mcap"
+        write_log(recording, path)
+        kept.append(log_pictures(path, digest(path), grid, [START_NS]))
+    assert kept[0].frames == kept[1].frames
+    assert kept[0].frames[START_NS].image
+    np.testing.assert_array_equal(kept[0].track.projection, kept[1].track.projection)
+    assert kept[0].track.projection.any()
+
+
+WORLD = street(1, frames=4, cameras=RIG)
+
+
+def _with_disparity(moments):
+    disparity = png(np.full((HEIGHT, WIDTH), 500, np.uint16))
+    for moment in moments:
+        cameras = {name: replace(frame, disparity_png=disparity) for name, frame in moment.cameras.items()}
+        yield replace(moment, cameras=cameras)

@@ -1,6 +1,9 @@
+import re
+
 import numpy as np
 import pytest
 from support.driving import driving
+from support.single import single
 from support.toy_world import Mount, street
 
 from semgrid_eval.classes import DEFAULT_CLASSES, NO_POINT
@@ -9,6 +12,8 @@ from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording import png
 from semgrid_eval.sensors.camera import CameraSensor, read_cameras
+from semgrid_eval.sensors.kinds import misfit, times_of
+from semgrid_eval.sensors.lidar import ColourFrom, LidarSensor
 
 
 @pytest.fixture
@@ -59,3 +64,19 @@ def test_parts_belong_together_if_their_camera_is_the_same_or_the_only_one():
     assert not CameraSensor(camera="rear").shares_image_with(CameraSensor(camera="front"))
     assert CameraSensor(bottom_px=256).is_whole_image
     assert not CameraSensor(bottom_px=255).is_whole_image
+
+
+def test_a_camera_without_disparity_is_told_with_what_it_can_do_before_anything_is_read(tmp_path):
+    recording = street(1, frames=1, cameras={"front": Mount(), "left": Mount(1.5)}).recording()
+    write_log(single(recording, "left"), tmp_path / "log.mcap")
+    line = r"log\.mcap: camera left: has no disparity, .* \{kind: lidar, colour_from: \{camera: left\}\}$"
+    both = {"a": CameraSensor(camera="front"), "b": CameraSensor(camera="left")}
+    with LogReader(tmp_path / "log.mcap") as log:
+        with pytest.raises(LogError, match=line):
+            read_cameras(log, both, DEFAULT_CLASSES.class_by_label())
+        with pytest.raises(LogError, match=line):
+            times_of(log, both["b"])
+        assert re.search(line, misfit(log, both.values()))
+        assert misfit(log, [both["a"]]) is None
+        coloured = LidarSensor(colour_from=ColourFrom(camera="left"))
+        assert misfit(log, [coloured]).endswith("lidar: the log has none")

@@ -5,9 +5,11 @@ looks straight ahead: what is Z m ahead, y m left and z m high is at u = 200 - 1
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.single import single
 from support.swept import START_NS, recorded, sweep
 from support.toy_world import png
 
@@ -159,6 +161,32 @@ def test_several_sweeps_each_find_their_image(tmp_path):
     assert found == [[CAR], [ROAD], [CAR]]
 
 
+def test_of_several_cameras_the_first_that_sees_a_point_gives_its_label(tmp_path):
+    """The second one looks back, and sees what is behind; what both miss has no class."""
+    back = replace(CAMERA, yaw_rad=math.pi)
+    images = {"ahead": frame(0, label_image("car")), "back": frame(0, label_image("pole"))}
+    points = [(10, 1, 0), (-10, 1, 0), (0, 10, 0)]
+    sweeps = {"top": sweep(START_NS, points, mount=MOUNT)}
+
+    def moments():
+        yield Moment(START_NS, images, (MotionSample(START_NS, 0.0, 0.0),), sweeps=sweeps)
+
+    cameras = {"ahead": CAMERA, "back": back, "above": CAMERA}
+    images["above"] = frame(0, label_image("road"))
+    write_log(replace(recorded(moments), calibrations=cameras), tmp_path / "log.mcap")
+    found = {}
+    with LogReader(tmp_path / "log.mcap") as log:
+        for names in (("ahead", "back"), ("back", "above", "ahead"), ("back",)):
+            sensors = {"top": LidarSensor(colour_from=ColourFrom(camera=names))}
+            (seen,) = read_lidars(log, sensors, DEFAULT_CLASSES.class_by_label())
+            found[names] = seen.class_id.tolist()
+    assert found == {
+        ("ahead", "back"): [CAR, POLE, NO_POINT],
+        ("back", "above", "ahead"): [ROAD, POLE, NO_POINT],
+        ("back",): [NO_POINT, POLE, NO_POINT],
+    }
+
+
 @pytest.mark.parametrize(
     ("settings", "image", "line"),
     [
@@ -177,3 +205,25 @@ def test_without_colouring_configurations_keep_their_digests():
     coloured = parse_config(GridConfig, {"sensors": {"top": {"kind": "lidar", "colour_from": {}}}, "target": ["top"]})
     assert coloured.sensors["top"].colour_from == ColourFrom()
     assert parse_config(GridConfig, coloured.model_dump(mode="json")) == coloured
+
+
+def test_a_camera_without_disparity_colours_as_the_same_with_it(tmp_path):
+    found = []
+    for name, change in (("stereo", lambda recording: recording), ("single", single)):
+        write_log(change(rig_of(label_image(car=(110, 190)))), tmp_path / f"{name}.mcap")
+        with LogReader(tmp_path / f"{name}.mcap") as log:
+            sensors = {"top": LidarSensor(colour_from=ColourFrom())}
+            (points,) = read_lidars(log, sensors, DEFAULT_CLASSES.class_by_label())
+        found.append(points.class_id.tolist())
+    assert found == [[CAR, NO_POINT]] * 2
+
+
+def rig_of(label):
+    """One sweep beside one frame."""
+    points = [(10, 1, -1), (10, -2, 0)]
+
+    def moments():
+        sweeps = {"top": sweep(START_NS, points, mount=MOUNT)}
+        yield Moment(START_NS, {"front": frame(0, label)}, (MotionSample(START_NS, 0.0, 0.0),), sweeps=sweeps)
+
+    return replace(recorded(moments), calibrations={"front": CAMERA})

@@ -91,36 +91,57 @@ STEREO = {
     ),
 }
 """Focal length, principal point and lens, then turn and place, of the pair of a real log."""
+RING = {
+    "ring_front_center": (
+        (1776.041484, 777.990573, 1013.524325, -0.240732, -0.212243, 0.325902),
+        (0.501645, -0.498620, 0.501070, -0.498657, 1.635018, 0.002676, 1.397967),
+    ),
+    "ring_rear_left": (
+        (1683.942719, 1029.043729, 765.769259, -0.275489, -0.053898, 0.118793),
+        (0.601889, -0.603460, -0.369956, 0.369727, 1.090193, 0.126106, 1.418716),
+    ),
+}
+"""Likewise of two of the ring cameras, of which the first is turned upright."""
 STEREO_SIZE, STEREO_SCALE = (512, 388), 0.25
 PLANE_M = 12.0
 """How far ahead of the rear axle the upright plane stands that the pair sees."""
 STEREO_STEP_NS, STEREO_OFFSET_NS, APART_NS = 50_000_000, 20_000_000, 1_000_000
 
 
-def stereo_tables() -> tuple[dict[str, list[Any]], dict[str, list[Any]]]:
-    """Intrinsics of the pair, its images a quarter as large as the real ones, and extrinsics."""
-    intrinsics: dict[str, list[Any]] = {"sensor_name": list(STEREO)}
-    numbers = np.array([lens for lens, _ in STEREO.values()])
+def size_of(name: str) -> tuple[int, int]:
+    """Width and height of the images of a camera."""
+    return STEREO_SIZE[::-1] if name == "ring_front_center" else STEREO_SIZE
+
+
+def camera_tables(cameras: dict[str, Any] = STEREO) -> tuple[dict[str, list[Any]], dict[str, list[Any]]]:
+    """Intrinsics of cameras, their images a quarter as large as the real ones, and extrinsics."""
+    intrinsics: dict[str, list[Any]] = {"sensor_name": list(cameras)}
+    numbers = np.array([lens for lens, _ in cameras.values()])
     scaled = numbers[:, [0, 0, 1, 2]] * STEREO_SCALE
     for name, column in zip(("fx_px", "fy_px", "cx_px", "cy_px"), scaled.T, strict=True):
         intrinsics[name] = column.tolist()
     for name, column in zip(("k1", "k2", "k3"), numbers[:, 3:].T, strict=True):
         intrinsics[name] = column.tolist()
-    intrinsics["height_px"], intrinsics["width_px"] = [STEREO_SIZE[1]] * 2, [STEREO_SIZE[0]] * 2
-    places: dict[str, list[Any]] = {"sensor_name": list(STEREO)}
+    intrinsics["width_px"], intrinsics["height_px"] = map(list, zip(*map(size_of, cameras), strict=True))
+    places: dict[str, list[Any]] = {"sensor_name": list(cameras)}
     for number, name in enumerate(("qw", "qx", "qy", "qz", "tx_m", "ty_m", "tz_m")):
-        places[name] = [place[number] for _, place in STEREO.values()]
+        places[name] = [place[number] for _, place in cameras.values()]
     return intrinsics, places
 
 
-def stereo_image(name: str) -> NDArray[np.uint8]:
-    """What a camera of the pair sees of a wall with spots, upright and across the way, without distortion."""
-    (focal_px, u0_px, v0_px, *_), (w, x, y, z, *place_m) = STEREO[name]
-    rows, columns = np.mgrid[: STEREO_SIZE[1], : STEREO_SIZE[0]]
+def on_wall(name: str, plane_m: float) -> NDArray[np.float64]:
+    """Where the pixels of a camera meet a wall, upright and across the way, without distortion: (H, W, 3) x, y, z."""
+    (focal_px, u0_px, v0_px, *_), (w, x, y, z, *place_m) = {**STEREO, **RING}[name]
+    columns, rows = np.meshgrid(*map(np.arange, size_of(name)))
     f_px, u_px, v_px = (each * STEREO_SCALE for each in (focal_px, u0_px, v0_px))
     rays = np.stack([(columns - u_px) / f_px, (rows - v_px) / f_px, np.ones(rows.shape)], axis=-1)
     rays = rays @ rotation_of((x, y, z, w)).T
-    across = rays * ((PLANE_M - place_m[0]) / rays[..., :1]) + np.array(place_m)
+    return np.asarray(rays * ((plane_m - place_m[0]) / rays[..., :1]) + np.array(place_m))
+
+
+def stereo_image(name: str) -> NDArray[np.uint8]:
+    """What a camera of the pair sees of a wall with spots."""
+    across = on_wall(name, PLANE_M)
     spots = np.random.default_rng(1).integers(0, 256, (400, 400), np.uint8)
     spots = cv2.GaussianBlur(spots, (0, 0), 1.2)
     spots = cv2.normalize(spots, None, 0, 255, cv2.NORM_MINMAX)
@@ -128,10 +149,38 @@ def stereo_image(name: str) -> NDArray[np.uint8]:
     return np.asarray(cv2.remap(spots, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP), np.uint8)
 
 
-def write_stereo(folder: Path) -> None:
-    """Write calibration and images of the pair, by their own clock and the right ones a little late."""
-    for name, content in zip(("intrinsics", "egovehicle_SE3_sensor"), stereo_tables(), strict=True):
+RED, BLUE = (0, 0, 255), (255, 0, 0)  # as OpenCV has them
+WALLS = {"ring_front_center": (PLANE_M, 0.5, (BLUE, RED)), "ring_rear_left": (-PLANE_M, 5.0, (RED, BLUE))}
+"""What the ring cameras see: how far ahead a wall stands, where its colour changes, and the left and the right one."""
+RING_OFFSET_NS = 5_000_000
+
+
+def ring_image(name: str) -> NDArray[np.uint8]:
+    """What a ring camera sees of its wall."""
+    plane_m, edge_m, (left, right) = WALLS[name]
+    is_left = on_wall(name, plane_m)[..., 1:2] > edge_m
+    return np.where(is_left, left, right).astype(np.uint8)
+
+
+def write_ring(folder: Path) -> None:
+    """Write images of the ring cameras, twice for each time of boxes and a little after it."""
+    for name in RING:
+        image = ring_image(name)
+        images = folder / "sensors" / "cameras" / name
+        images.mkdir(parents=True)
+        for number in range(4):
+            stamp_ns = START_NS + RING_OFFSET_NS + number * STEREO_STEP_NS
+            cv2.imwrite(str(images / f"{stamp_ns}.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 95])
+
+
+def write_calibration(folder: Path, cameras: dict[str, Any]) -> None:
+    """Write intrinsics and extrinsics of cameras."""
+    for name, content in zip(("intrinsics", "egovehicle_SE3_sensor"), camera_tables(cameras), strict=True):
         write_table(folder / "calibration" / f"{name}.feather", content)
+
+
+def write_stereo(folder: Path) -> None:
+    """Write images of the pair, by their own clock and the right ones a little late."""
     for name, late_ns in zip(STEREO, (0, APART_NS), strict=True):
         image = stereo_image(name)
         images = folder / "sensors" / "cameras" / name
@@ -141,9 +190,9 @@ def write_stereo(folder: Path) -> None:
             cv2.imwrite(str(images / f"{stamp_ns}.jpg"), image, [cv2.IMWRITE_JPEG_QUALITY, 95])
 
 
-def write_small_images(images: Path) -> None:
-    """Make the images of the left camera smaller than its calibration says."""
-    for path in sorted((images / "stereo_front_left").iterdir()):
+def write_small_images(images: Path, camera: str = "stereo_front_left") -> None:
+    """Make the images of a camera smaller than its calibration says."""
+    for path in sorted((images / camera).iterdir()):
         cv2.imwrite(str(path), np.zeros((100, 200), np.uint8))
 
 
@@ -161,6 +210,7 @@ def write_argoverse(
     frames: int = FRAMES,
     sweeps: bool = False,
     stereo: bool = False,
+    ring: bool = False,
 ) -> Path:
     """Write a log, and return its folder."""
     folder = root / split / name
@@ -168,8 +218,12 @@ def write_argoverse(
     write_table(folder / "city_SE3_egovehicle.feather", pose_columns(frames))
     (folder / "map").mkdir()
     (folder / "map" / f"log_map_archive_{name}____PIT_city_1.json").write_text(json.dumps(city_map()))
+    if stereo or ring:
+        write_calibration(folder, {**(STEREO if stereo else {}), **(RING if ring else {})})
     if stereo:
         write_stereo(folder)
+    if ring:
+        write_ring(folder)
     if sweeps:
         points = {"x": [1.5, -2.0], "y": [0.25, 3.0], "z": [0.0, 1.0]}
         halves: dict[str, Any] = {axis: pa.array(np.array(each, np.float16)) for axis, each in points.items()}

@@ -42,9 +42,9 @@ class RigBag:
     def map_text(self, *lines: str, ids: str = "label_ids") -> str:
         """The map file that fits, with more lines for each LiDAR."""
         text = ["motion:", "  speed: {topic: /odom, by: twist}"]
-        for name in self.recording.calibrations:
+        for name, parts in self._parts().items():
             text += ["cameras:"] * ("cameras:" not in text)
-            topics = {part: f"/{name}/{part}" for part in ("image", "info", "disparity", "labels")}
+            topics = {part: f"/{name}/{part}" for part in parts}
             text += [f"  {name}:", "    rectified: true", *(f"    {part}: {topic}" for part, topic in topics.items())]
         for name in self._lidars():
             text += ["lidars:"] * ("lidars:" not in text)
@@ -55,6 +55,11 @@ class RigBag:
     def messages(self) -> Iterator[Sent]:
         """All messages as they are recorded."""
         return iter(sorted(self._in_any_order(), key=lambda sent: sent.received_ns))
+
+    def _parts(self) -> dict[str, list[str]]:
+        """What there is of each camera, as the keys of a map."""
+        frames = [(name, frame) for moment in self.recording.moments() for name, frame in moment.cameras.items()]
+        return {name: list(self._pictures(name, frame)) for name, frame in frames}
 
     def _lidars(self) -> list[str]:
         return sorted({name for moment in self.recording.moments() for name in moment.sweeps})
@@ -78,14 +83,15 @@ class RigBag:
 
     def _pictures(self, name: str, frame: CameraFrame) -> dict[str, Any]:
         calibration, stamp_ns = self.recording.calibrations[name], frame.stamp_ns
-        disparity_px = decoded_disparity(decode_gray(frame.disparity_png, bit_depth=16))
-        label = decode_gray(frame.label_png, bit_depth=8).astype(np.uint8)
-        return {
-            "info": ros.camera_info(stamp_ns, disparity_px.shape[1::-1], ros.matrix(calibration)),
-            "disparity": ros.disparity_image(stamp_ns, disparity_px, calibration),
-            "labels": ros.image(stamp_ns, label, "mono8"),
-            "image": ros.image(stamp_ns, decode_colour(frame.image_file), "rgb8", frame=optical(name)),
-        }
+        image = decode_colour(frame.image_file)
+        found = {"info": ros.camera_info(stamp_ns, image.shape[1::-1], ros.matrix(calibration))}
+        if frame.disparity_png is not None:
+            disparity_px = decoded_disparity(decode_gray(frame.disparity_png, bit_depth=16))
+            found["disparity"] = ros.disparity_image(stamp_ns, disparity_px, calibration)
+        if frame.label_png is not None:
+            label = decode_gray(frame.label_png, bit_depth=8).astype(np.uint8)
+            found["labels"] = ros.image(stamp_ns, label, "mono8")
+        return {**found, "image": ros.image(stamp_ns, image, "rgb8", frame=optical(name))}
 
     def cloud(self, name: str, sweep: LidarSweep) -> Any:
         """The cloud of a sweep."""

@@ -5,7 +5,8 @@ SRC/<split>/<log>/city_SE3_egovehicle.feather      poses, among them one for eac
 SRC/<split>/<log>/map/log_map_archive_*.json       drivable areas and crossings in the city frame
 SRC/<split>/<log>/sensors/lidar/<time>.feather     sweeps in the vehicle frame, where present
 SRC/<split>/<log>/sensors/cameras/stereo_front_*   undistorted images of the stereo pair, where present
-SRC/<split>/<log>/calibration/*.feather            of the pair, where there are images of it
+SRC/<split>/<log>/sensors/cameras/ring_*           undistorted images of single cameras, where present
+SRC/<split>/<log>/calibration/*.feather            of cameras, where there are images
 """
 
 from pathlib import Path
@@ -13,9 +14,7 @@ from pathlib import Path
 from semgrid_eval.errors import InputError
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs, how_to_label
 from semgrid_eval.sources.argoverse2.drive import Drive
-from semgrid_eval.sources.argoverse2.pairs import cameras_folder
 from semgrid_eval.sources.argoverse2.source import ArgoverseOptions
-from semgrid_eval.sources.argoverse2.stereo import CAMERA
 
 SPLITS = ("train", "val", "test")
 
@@ -40,7 +39,7 @@ def _drives(options: ArgoverseOptions) -> list[Drive]:
             raise InputError(f"{split} is not one of: {', '.join(there) or 'none'}", path=options.src, field="split")
     chosen = [split for split in there if split in options.split or not options.split]
     found = [
-        Drive(folder, split, options.stereo_every)
+        Drive(folder, split, options.stereo_every, options.ring_every)
         for split in chosen
         for folder in sorted((options.src / split).iterdir())
         if folder.is_dir() and not folder.name.startswith(".")
@@ -52,9 +51,5 @@ def _drives(options: ArgoverseOptions) -> list[Drive]:
 
 def _remark(drives: list[Drive], out: Path) -> str:
     """Say in one line what is not there."""
-    parts = []
-    if seen := sum(bool(drive.pairs) for drive in drives):
-        parts.append(f"no labels for {CAMERA} of {seen} logs: {how_to_label(out)}")
-    if rings := sum(any(cameras_folder(drive.folder).glob("ring_*")) for drive in drives):
-        parts.append(f"images of ring cameras left out, as nothing tells their depth, in {rings} logs")
-    return "; ".join(parts)
+    seen = sum(bool(drive.pairs or drive.rings) for drive in drives)
+    return f"no labels for the cameras of {seen} logs: {how_to_label(out)}" if seen else ""

@@ -1,8 +1,9 @@
 """One log of Argoverse as a recording: its files, their digest, and the moments they hold."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,12 @@ from semgrid_eval.files import digest_files, digest_value
 from semgrid_eval.recording import road_map
 from semgrid_eval.recording.lidar import LidarSweep, Mount
 from semgrid_eval.recording.types import CameraFrame, Moment, Recording
+from semgrid_eval.sources.argoverse2.cameras import Look, calibration_files, stamped
 from semgrid_eval.sources.argoverse2.city_map import city_of, find_archive, read_map
-from semgrid_eval.sources.argoverse2.pairs import Pair, pairs_of, stamped
-from semgrid_eval.sources.argoverse2.stereo import CAMERA, StereoCamera, calibration_files
-from semgrid_eval.sources.argoverse2.tables import MAX_FILE_BYTES, read_table
+from semgrid_eval.sources.argoverse2.pairs import Pair, pairs_of
+from semgrid_eval.sources.argoverse2.ring import Images, ring_images, ring_look
+from semgrid_eval.sources.argoverse2.stereo import CAMERA, stereo_look
+from semgrid_eval.sources.argoverse2.tables import MAX_FILE_BYTES, Table, read_table
 from semgrid_eval.sources.argoverse2.tracks import actors_of, read_boxes, read_poses
 from semgrid_eval.sources.argoverse2.vehicle import EGO_FROM_ARGOVERSE
 from semgrid_eval.sources.poses import motion_of, planar
@@ -35,6 +38,7 @@ class Drive:
     folder: Path
     split: str
     stereo_every: int  # every how many pairs of images one is taken; 0: none
+    ring_every: int  # likewise of the images of each ring camera
 
     @property
     def name(self) -> str:
@@ -50,6 +54,11 @@ class Drive:
     def pairs(self) -> tuple[Pair, ...]:
         """The pairs of images that are taken; an InputError says that there are images, but no pair."""
         return pairs_of(self.folder)[:: self.stereo_every] if self.stereo_every else ()
+
+    @cached_property
+    def rings(self) -> dict[str, Images]:
+        """The images that are taken of ring cameras."""
+        return ring_images(self.folder, self.ring_every)
 
     def digest(self) -> str:
         """Digest the bytes of all files that are used."""
@@ -68,12 +77,13 @@ class Drive:
     def recording(self) -> Recording:
         """Return the recording; sweeps are read while it is streamed."""
         archive = find_archive(self.folder)
+        looks = self._looks(self._times_ns(read_boxes(self._boxes)))
         return Recording(
             name=self.name,
             dataset=DATASET,
             split=self.split,
             group=city_of(archive) or self.name,
-            calibrations={CAMERA: StereoCamera(self.folder).calibration} if self.pairs else {},
+            calibrations={name: look.calibration for name, look in looks.items()},
             source_digest=self._digest,
             moments=self._moments,
             source_files={road_map.FILE: read_map(archive).to_json()},
@@ -81,8 +91,9 @@ class Drive:
 
     @property
     def _images(self) -> list[Path]:
-        """The files that the stereo camera is made of."""
+        """The files that cameras are made of."""
         images = [path for pair in self.pairs for path in (pair.left, pair.right)]
+        images += [path for ring in self.rings.values() for path in ring.values()]
         return [*calibration_files(self.folder), *images] if images else []
 
     @property
@@ -95,27 +106,45 @@ class Drive:
 
     def _moments(self) -> Iterator[Moment]:
         boxes = read_boxes(self._boxes)
-        stamps_ns: list[int] = np.unique(boxes["timestamp_ns"]).tolist()
-        if len(stamps_ns) < 2:
-            raise InputError("has boxes of a single time; motion needs more", path=self._boxes)
+        stamps_ns = self._times_ns(boxes)
         places = read_poses(self._poses, stamps_ns)
         actors = actors_of(boxes, places, self._boxes)
         poses = [planar(stamp_ns, places[stamp_ns]) for stamp_ns in stamps_ns]
-        frames = self._frames(stamps_ns[0], stamps_ns[-1])
+        frames = self._frames(stamps_ns)
         motion = dict(zip(stamps_ns, zip(poses, motion_of(poses), strict=True), strict=True))
         for now_ns in sorted({*motion, *frames}):
-            cameras = {CAMERA: frames[now_ns]()} if now_ns in frames else {}
+            cameras = {name: make() for name, make in frames.get(now_ns, {}).items()}
             if now_ns in motion:
                 pose, sample = motion[now_ns]
                 yield Moment(now_ns, cameras, (sample,), pose, actors[now_ns], self._seen(now_ns))
             else:
                 yield Moment(now_ns, cameras)
 
-    def _frames(self, first_ns: int, last_ns: int) -> dict[int, Callable[[], CameraFrame]]:
-        """Return what makes the frames of the times in which motion is known."""
-        within = [pair for pair in self.pairs if first_ns <= pair.stamp_ns <= last_ns]
-        camera = StereoCamera(self.folder) if within else None
-        return {pair.stamp_ns: partial(camera.frame, pair) for pair in within} if camera else {}
+    def _times_ns(self, boxes: Table) -> list[int]:
+        """Return the times of boxes, which are those of motion."""
+        found: list[int] = np.unique(boxes["timestamp_ns"]).tolist()
+        if len(found) < 2:
+            raise InputError("has boxes of a single time; motion needs more", path=self._boxes)
+        return found
+
+    def _looks(self, times_ns: list[int]) -> dict[str, Look]:
+        """Return what cameras see while motion is known; those that see nothing then are left out."""
+        first_ns, last_ns = times_ns[0], times_ns[-1]
+        pairs = [pair for pair in self.pairs if first_ns <= pair.stamp_ns <= last_ns]
+        rings = {
+            name: {stamp_ns: path for stamp_ns, path in images.items() if first_ns <= stamp_ns <= last_ns}
+            for name, images in self.rings.items()
+        }
+        found = {CAMERA: stereo_look(self.folder, pairs)} if pairs else {}
+        return found | {name: ring_look(self.folder, name, images) for name, images in rings.items() if images}
+
+    def _frames(self, times_ns: list[int]) -> dict[int, dict[str, Callable[[], CameraFrame]]]:
+        """Return what makes frames, by time and camera."""
+        found: dict[int, dict[str, Callable[[], CameraFrame]]] = defaultdict(dict)
+        for name, look in self._looks(times_ns).items():
+            for stamp_ns, make in look.frames.items():
+                found[stamp_ns][name] = make
+        return found
 
     def _seen(self, now_ns: int) -> dict[str, LidarSweep]:
         return {LIDAR: _sweep(now_ns, self.sweeps[now_ns])} if now_ns in self.sweeps else {}

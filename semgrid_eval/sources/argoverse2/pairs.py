@@ -1,6 +1,5 @@
 """Which images of the stereo cameras belong together."""
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
+from semgrid_eval.sources.argoverse2.cameras import cameras_folder, images_of
 
 LEFT, RIGHT = "stereo_front_left", "stereo_front_right"
 TOGETHER_NS = 5_000_000
 """Both images of a pair are taken within this time: a tenth of the time between pairs."""
-_STAMP = re.compile(r"[0-9]{1,19}")
 
 
 @dataclass(frozen=True)
@@ -24,23 +23,13 @@ class Pair:
     right: Path
 
 
-def stamped(folder: Path, pattern: str) -> dict[int, Path]:
-    """Return the files of a folder whose names are times, by time."""
-    return {int(path.stem): path for path in sorted(folder.glob(pattern)) if _STAMP.fullmatch(path.stem)}
-
-
-def cameras_folder(log: Path) -> Path:
-    """Return the folder of a log that holds the folders of its cameras."""
-    return log / "sensors" / "cameras"
-
-
 def pairs_of(log: Path) -> tuple[Pair, ...]:
     """Find the pairs of a log, in the order of time; images of one camera alone are left out.
 
     Raises:
         InputError: there are images, but no pair.
     """
-    left, right = (stamped(cameras_folder(log) / name, "*.jpg") for name in (LEFT, RIGHT))
+    left, right = (images_of(log, name) for name in (LEFT, RIGHT))
     if not (left or right):
         return ()
     for name, found, other, there in ((LEFT, left, RIGHT, right), (RIGHT, right, LEFT, left)):

@@ -5,7 +5,7 @@ SRC/sequences/<NN>/times.txt            seconds, a line for each frame
 SRC/sequences/<NN>/poses.txt            of camera 0, or SRC/poses/<NN>.txt
 SRC/sequences/<NN>/velodyne/000000.bin  x, y, z, reflectance, float32
 SRC/sequences/<NN>/labels/000000.label  SemanticKITTI's, where present
-SRC/sequences/<NN>/image_2, image_3     rectified colour images, where both are present
+SRC/sequences/<NN>/image_2, image_3     rectified colour images, left and right; the left ones may be alone
 """
 
 import re
@@ -59,8 +59,7 @@ def _sequence(folder: Path, options: KittiOptions) -> KittiSequence:
     """See what a sequence has, without reading any file."""
     scans, left, right = (_numbers(folder, channel) for channel in ("velodyne", "image_2", "image_3"))
     channels = [name for name in ("velodyne", "labels") if scans and (folder / name).is_dir()]
-    if left and right:
-        channels += ["image_2", "image_3"]
+    channels += ["image_2"] * bool(left) + ["image_3"] * bool(left and right)
     numbers = scans or (left if right else [])
     if not numbers:
         raise InputError("holds neither scans nor pairs of images", path=folder)
@@ -88,15 +87,18 @@ def _parts(sequence: KittiSequence, options: KittiOptions) -> Iterator[Part]:
 
 def _remark(sequences: list[KittiSequence], out: Path) -> str:
     """Say in one line what is not there."""
-    unlabelled = [
-        each.folder.name for each in sequences if "velodyne" in each.channels and "labels" not in each.channels
-    ]
-    blind = [each.folder.name for each in sequences if "image_2" not in each.channels]
-    parts = []
-    if unlabelled:
-        parts.append(f"scans without labels, of which no grid can be made: {', '.join(unlabelled)}")
-    if blind:
-        parts.append(f"no pairs of images, so no camera: {', '.join(blind)}")
-    if seen := [each.folder.name for each in sequences if "image_2" in each.channels]:
-        parts.append(f"no labels for the cameras of {', '.join(seen)}: {how_to_label(out)}")
+
+    def those(has: str = "", lacks: str = "") -> str:
+        """Name the sequences that have one channel and lack another."""
+        chosen = (each for each in sequences if has in ("", *each.channels) and lacks not in each.channels)
+        return ", ".join(each.folder.name for each in chosen)
+
+    told = {
+        "scans without labels, which a camera has to colour": those("velodyne", lacks="labels"),
+        "no images, so no camera": those(lacks="image_2"),
+        "no right images, so no disparity": those("image_2", lacks="image_3"),
+    }
+    parts = [f"{what}: {names}" for what, names in told.items() if names]
+    if seen := those("image_2"):
+        parts.append(f"no labels for the cameras of {seen}: {how_to_label(out)}")
     return "; ".join(parts)

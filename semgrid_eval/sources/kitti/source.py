@@ -11,8 +11,9 @@ from semgrid_eval.sources.known import Source, later
 _HELP = """Convert sequences of KITTI or SemanticKITTI to logs OUT/<split>/<sequence>_<first frame>.mcap.
 
 SRC/sequences/<NN> holds velodyne, labels (SemanticKITTI's), image_2 and image_3, calib.txt, times.txt and poses.txt;
-poses may also be SRC/poses/<NN>.txt. Scans, or both images, are needed. Disparity is matched from the images, speed
-and yaw rate come from the poses, and labels become Cityscapes' by a map (docs/lidar.md).
+poses may also be SRC/poses/<NN>.txt. Scans, or both images, are needed. Disparity is matched from the images; image_2
+alone becomes a camera without. Speed and yaw rate come from the poses, and labels become Cityscapes' by a map
+(docs/lidar.md).
 
 A recording fails as a whole, in one line, if a file of one of its frames is missing or broken, labels and points
 differ in number, a class is unknown or there are too few poses. The others are converted; the exit code is then 1.

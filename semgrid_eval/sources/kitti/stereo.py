@@ -1,4 +1,4 @@
-"""The colour camera of KITTI: calibration of the left image, and disparity by matching it with the right one."""
+"""The left colour camera of KITTI: its calibration, and disparity by matching its images with the right ones."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from semgrid_eval.sources.kitti.files import Calibration, read_file
 from semgrid_eval.sources.matching import SemiGlobalMatching, grey_of
 
 
-def calibration_of(given: Calibration, ego_from_camera0: SE3, path: Path) -> CameraCalibration:
+def calibration_of(given: Calibration, ego_from_camera0: SE3, path: Path, *, with_disparity: bool) -> CameraCalibration:
     """Return the left colour camera's; all cameras of KITTI are rectified to the axes of camera 0.
 
     Raises:
@@ -27,23 +27,25 @@ def calibration_of(given: Calibration, ego_from_camera0: SE3, path: Path) -> Cam
     except np.linalg.LinAlgError as error:
         raise InputError("is not a projection", path=path, field="P2, P3") from error
     x_m, y_m, z_m = ego_from_camera0.apply(np.asarray(camera_m, np.float64)).tolist()
-    baseline_m = float(right_m[0] - camera_m[0])
+    baseline_m = float(right_m[0] - camera_m[0]) if with_disparity else None
     with located(path=path):
         return CameraCalibration(fx_px, fy_px, u0_px, v0_px, baseline_m, x_m, y_m, z_m, 0.0, 0.0, 0.0)
 
 
-class StereoPairs:
-    """Makes frames of the pairs of images, PNG files whose bytes the log keeps."""
+class LeftCamera:
+    """Makes frames of images, PNG files whose bytes the log keeps; with a baseline, of pairs."""
 
     def __init__(self, calibration: CameraCalibration) -> None:
-        self._matching = SemiGlobalMatching(calibration)
+        self._matching = None if calibration.baseline_m is None else SemiGlobalMatching(calibration)
 
     def frame(self, stamp_ns: int, left: Path, right: Path) -> CameraFrame:
-        """Read and match the pair of a time.
+        """Read the image of a time, and match it with the right one where there is disparity.
 
         Raises:
             InputError: an image is missing or damaged, or their sizes differ.
         """
+        if self._matching is None:
+            return CameraFrame(stamp_ns, image_file=read_file(left), disparity_png=None, label_png=None)
         files = [read_file(path) for path in (left, right)]
         grey = [grey_of(data, path) for data, path in zip(files, (left, right), strict=True)]
         if grey[0].shape != grey[1].shape:

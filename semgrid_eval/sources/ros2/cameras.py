@@ -49,7 +49,7 @@ class Info:
         return np.hstack([np.array(self.k).reshape(3, 3), np.zeros((3, 1))])
 
 
-def calibration_of(projection: NDArray[np.float64], baseline: float, place: Extrinsics) -> CameraCalibration:
+def calibration_of(projection: NDArray[np.float64], baseline: float | None, place: Extrinsics) -> CameraCalibration:
     """Put the parts of a calibration together."""
     return CameraCalibration(
         fx_px=float(projection[0, 0]),

@@ -37,12 +37,15 @@ class CameraSeen:
         return self.image or self.depth or self.disparity
 
     @property
+    def is_single(self) -> bool:
+        """Whether nothing tells its depth."""
+        return not (self.disparity or self.depth or self.right)
+
+    @property
     def lacks(self) -> str:
-        """What the bag does not give of it, in words; empty if grids can be made of it."""
+        """What the bag does not give of it, in words; empty if a log can hold it."""
         if not self.info:
-            return "no CameraInfo of its size is in the bag"
-        if not (self.disparity or self.depth or self.right):
-            return "nothing in the bag tells its depth"
+            return "no CameraInfo of its own is in the bag"
         return "" if self.image or self.labels else "it has neither images nor labels"
 
 
@@ -82,6 +85,7 @@ class _Finder:
         cameras += self._without_images(without_image)
         cameras, unknown = self._joined(cameras, "labels")
         unknown += [name for name in left_over if name not in without_image]
+        cameras = [replace(each, info="") if self._borrows(each, cameras) else each for each in cameras]
         return sorted(cameras, key=lambda camera: camera.main), sorted(unknown)
 
     def info_of(self, topic: str) -> str:
@@ -167,6 +171,13 @@ class _Finder:
     def _is_depth(self, name: str) -> bool:
         shape = self._topics[name].shape
         return (shape is not None and shape.coding in _DEPTH_CODINGS) or _has_word(name, _DEPTH_WORDS)
+
+    def _borrows(self, camera: CameraSeen, cameras: Sequence[CameraSeen]) -> bool:
+        """Tell whether a camera has got a CameraInfo of its size that is another one's."""
+        shared = any(each.info == camera.info for each in cameras if each is not camera)
+        is_beside = camera.main.startswith(f"{_namespace(camera.info)}/")
+        is_framed = camera.info != "" and self._topics[camera.info].frame == self._topics[camera.main].frame
+        return camera.is_single and shared and not (is_beside or is_framed)
 
     def _is_of_right(self, info: str) -> bool:
         """Tell whether a CameraInfo is that of the second camera of a pair: P[3] = -f B."""

@@ -65,6 +65,9 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
     parts += [f"{kept} of {total} {what}; {told(lost)}", *_codings(plans[0])]
     if repeated := sum(plan.repeated for plan in plans):
         parts.append(f"{repeated} messages with a stamp that was there before left out")
+    if mapping.single:
+        worth = "labels of theirs can colour the points of a LiDAR: `colour_from` of the sensor"
+        parts.append(f"nothing tells the depth of {', '.join(sorted(mapping.single))}; {worth}")
     unlabelled = [name for name, camera in mapping.cameras.items() if camera.labels is None]
     if unlabelled:
         parts.append(f"no labels for {', '.join(unlabelled)}: {how_to_label(out)}")
@@ -77,8 +80,9 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
 def _codings(plan: BagPlan) -> list[str]:
     """Say for each camera what its depth loses in the coding of logs."""
     found = []
-    for name, rig in plan.stretches[0].rigs.items():
-        depth_px = rig.calibration.fx_px * rig.calibration.baseline_m  # disparity times depth
+    deep = {name: rig for name, rig in plan.stretches[0].rigs.items() if not rig.camera.is_single}
+    for name, rig in deep.items():
+        depth_px = rig.calibration.depth_disparity_m_px
         coded = f"{name}: disparity is rounded by at most 1/{1 / CODING_ERROR_PX:g} px"
         at_m, nearest_m = _TOLD_AT_M**2 / depth_px * CODING_ERROR_PX, depth_px / LARGEST_PX
         found.append(f"{coded}, {at_m:.3f} m at {_TOLD_AT_M:g} m; what is nearer than {nearest_m:.2f} m has none")

@@ -11,11 +11,13 @@ from semgrid_eval.sources.ros2.transforms import extrinsics_of
 _ONLY = "front"
 _LONGEST_NAME = 40  # of a sensor in a grid
 _VIRTUAL_BASELINE_M = 0.5
-_FROM = "disparity, depth, or a right image whose CameraInfo has the baseline in P"
+_SINGLE = """\
+    # Nothing in the bag tells its depth (disparity, depth, or a right image whose CameraInfo has the baseline in P):
+    # no grids of its own, but its labels colour a LiDAR's points (colour_from of the sensor), and reports show it."""
 
 
 def draft_cameras(contents: Contents, vehicle: str) -> Iterator[str]:
-    """Write a block for each camera that grids can be made of, that which looks ahead first.
+    """Write a block for each camera that a log can hold, that which looks ahead first.
 
     Where there is neither such a camera nor a LiDAR, what the first one lacks is left open.
     """
@@ -84,7 +86,7 @@ def _depth(camera: CameraSeen) -> Iterator[str]:
     elif camera.right:
         yield f"    right: {camera.right}  # to be matched with the image"
     else:
-        yield f"    disparity:  # nothing in the bag tells it: {_FROM}"
+        yield _SINGLE
     if camera.right_info and (camera.disparity or not camera.depth):
         yield f"    right_info: {camera.right_info}"
 

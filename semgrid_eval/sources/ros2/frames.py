@@ -1,7 +1,7 @@
 """Which messages make a frame, and which frames make a recording: by stamps alone."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -54,7 +54,7 @@ def frames_of(
     Raises:
         InputError: no frame has all.
     """
-    base = arrivals[camera.depth_topic]
+    base = arrivals[camera.main_topic]
     pictures = camera.pictures()
     places = {what: arrivals[topic].nearest(base.stamps_ns) for what, topic in pictures.items()}
     whole = np.ones(len(base.stamps_ns), np.bool_)
@@ -63,7 +63,7 @@ def frames_of(
         found = apart_ns <= tolerance_s * _NS_PER_S
         if not found.any():
             nearest_s = apart_ns.min() / _NS_PER_S
-            message = f"none is within {tolerance_s:g} s of {camera.depth_topic}; the nearest is {nearest_s:.3f} s away"
+            message = f"none is within {tolerance_s:g} s of {camera.main_topic}; the nearest is {nearest_s:.3f} s away"
             raise InputError(f"{message} (tolerance_s in the map)", field=topic)
         lost[f"without {what}"] += int((whole & ~found).sum())
         whole &= found
@@ -96,15 +96,18 @@ def covered(frames: Sequence[FramePlan], motion_ns: Stamps, lost: Counter[str]) 
 
 
 def stretches(
-    by_sensor: Mapping[str, Sequence[FramePlan]], longest_s: float, lost: Counter[str]
+    by_sensor: Mapping[str, Sequence[FramePlan]], single: Set[str], longest_s: float, lost: Counter[str]
 ) -> list[tuple[int, list[FramePlan]]]:
     """Cut the frames of all sensors where one of them has a hole, and into parts of at most `longest_s`.
 
-    Windows count frames, so no recording may have a hole. Each stretch comes with the number of its first frame, as
-    the first sensor counts them. `lost` counts the frames of stretches of a single frame.
+    Windows count frames, so no recording may have a hole, but for those of `single` cameras, of which there are no
+    grids. Each stretch comes with the number of its first frame, as the first sensor counts them. `lost` counts the
+    frames of stretches of a single frame.
     """
-    numbers, *others = [_stamps(frames) for frames in by_sensor.values()]
-    cuts_ns = {cut_ns for stamps_ns in (numbers, *others) for cut_ns in _holes(stamps_ns)}
+    stamps_by_sensor = {sensor: _stamps(frames) for sensor, frames in by_sensor.items()}
+    numbers = next(iter(stamps_by_sensor.values()))
+    counted = [stamps_ns for sensor, stamps_ns in stamps_by_sensor.items() if sensor not in single]
+    cuts_ns = {cut_ns for stamps_ns in counted for cut_ns in _holes(stamps_ns)}
     everything = sorted((each for frames in by_sensor.values() for each in frames), key=_order)
     stamps_ns = _stamps(everything)
     found = []

@@ -12,6 +12,8 @@ from semgrid_eval.labels import LABEL_ID
 Topic = Annotated[str, Field(pattern=r"^/\S+$")]
 Positive = Annotated[float, Field(gt=0)]
 SensorName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+_DEPTHS = ("disparity", "depth", "right")
+"""What tells the depth of a camera's pixels."""
 HIGHEST_PIXEL, HIGHEST_POINT = 255, 65_535
 """Ids that the label of a pixel, and that of a point, can have."""
 Ids = dict[str, tuple[int, ...]]
@@ -66,7 +68,7 @@ class Extrinsics(Config):
 
 
 class CameraMap(Config):
-    """The topics of one camera; one of `disparity`, `depth` and `right` is needed."""
+    """The topics of one camera; without `disparity`, `depth` and `right` it is a single one."""
 
     image: Topic | None = None
     info: Topic
@@ -82,15 +84,24 @@ class CameraMap(Config):
     extrinsics: Extrinsics | None = None  # None: tf tells them
 
     @model_validator(mode="after")
-    def _has_one_depth(self) -> Self:
-        given = [name for name in ("disparity", "depth", "right") if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise ValueError(f"one of disparity, depth and right is needed, not {' and '.join(given) or 'none'}")
+    def _has_at_most_one_depth(self) -> Self:
+        given = [name for name in _DEPTHS if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise ValueError(f"one of {', '.join(_DEPTHS)} at most, not {' and '.join(given)}")
+        if not given:
+            self._check_single()
         if self.right is not None and (self.image is None or self.right_info is None):
             raise ValueError("right needs image and right_info")
         if self.depth is not None and self.baseline_m is None and self.right_info is None:
             raise ValueError("depth needs baseline_m, by which it is coded as disparity; 0.5 is a good one")
         return self
+
+    def _check_single(self) -> None:
+        if self.image is None and self.labels is None:
+            raise ValueError("names neither image nor labels, nor what tells its depth")
+        for name in ("baseline_m", "right_info"):
+            if getattr(self, name) is not None:
+                raise ValueError(f"{name} needs one of {', '.join(_DEPTHS)}")
 
     @model_validator(mode="after")
     def _names_known_labels(self) -> Self:
@@ -98,9 +109,14 @@ class CameraMap(Config):
         return self
 
     @property
-    def depth_topic(self) -> str:
+    def is_single(self) -> bool:
+        """Whether nothing tells its depth."""
+        return all(getattr(self, name) is None for name in _DEPTHS)
+
+    @property
+    def main_topic(self) -> str:
         """The topic whose stamps are those of the frames."""
-        found = self.disparity or self.depth or self.image
+        found = self.disparity or self.depth or self.image or self.labels
         assert found is not None
         return found
 
@@ -151,6 +167,11 @@ class BagMap(Config):
         if same := self.cameras.keys() & self.lidars.keys():
             raise ValueError(f"lidars: {min(same)!r} is the name of a camera already")
         return self
+
+    @property
+    def single(self) -> set[str]:
+        """Names of the cameras whose depth nothing tells."""
+        return {name for name, camera in self.cameras.items() if camera.is_single}
 
 
 def load_map(path: Path) -> BagMap:

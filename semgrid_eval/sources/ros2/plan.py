@@ -73,7 +73,7 @@ def _fill(plan: BagPlan, path: Path, mapping: BagMap, cut: Cut, facts: Facts) ->
         rigs=rigs,
         lidars=lidars,
     )
-    for first, frames in stretches(by_sensor, cut.longest_s, plan.lost):
+    for first, frames in stretches(by_sensor, mapping.single, cut.longest_s, plan.lost):
         motion = rates.between(frames[0].stamp_ns - AROUND_NS, frames[-1].stamp_ns + AROUND_NS)
         name = f"{plan.name}_{first:06d}"
         plan.stretches.append(stretch(name=name, frames=tuple(frames), motion=motion))
@@ -87,7 +87,7 @@ def _frames(plan: BagPlan, mapping: BagMap, facts: Facts, rates: Rates) -> dict[
     for name, camera in mapping.cameras.items():
         whole = frames_of(name, camera, facts.arrivals, mapping.tolerance_s, plan.lost)
         found[name] = covered(whole, rates.stamps_ns, plan.lost)
-        plan.frames += len(facts.arrivals[camera.depth_topic].stamps_ns)
+        plan.frames += len(facts.arrivals[camera.main_topic].stamps_ns)
     for name, lidar in mapping.lidars.items():
         sweeps = sweeps_of(name, facts.arrivals[lidar.cloud])
         found[name] = covered(sweeps, rates.stamps_ns, plan.lost)

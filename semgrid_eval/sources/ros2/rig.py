@@ -81,7 +81,7 @@ class Rig:
         return CameraFrame(
             stamp_ns=stamp_ns,
             image_file=None if image is None else self._image(image),
-            disparity_png=encode_gray(coded_disparity(self._disparity_px(messages))),
+            disparity_png=None if self._camera.is_single else self._disparity_png(messages),
             label_png=None if labels is None else self._label_png(labels),
         )
 
@@ -92,6 +92,9 @@ class Rig:
 
     def _label_png(self, message: Any) -> bytes:  # noqa: ANN401
         return encode_gray(self._labels.label_ids(self._left.apply(pictures.ids_of(message), "nearest")))
+
+    def _disparity_png(self, messages: Mapping[str, Any]) -> bytes:
+        return encode_gray(coded_disparity(self._disparity_px(messages)))
 
     def _disparity_px(self, messages: Mapping[str, Any]) -> Disparity:
         """Return the disparity (H, W); 0 where there is none."""
@@ -108,7 +111,7 @@ class Rig:
 
 def depth_as_disparity_px(depth_m: Disparity, calibration: CameraCalibration) -> Disparity:
     """Return d = f B / Z of a depth image (H, W); 0 where there is no depth, or one too small to be coded."""
-    depth_px = np.float32(calibration.fx_px * calibration.baseline_m)
+    depth_px = np.float32(calibration.depth_disparity_m_px)
     known = np.isfinite(depth_m) & (depth_m >= depth_px / np.float32(LARGEST_PX))
     return np.divide(depth_px, depth_m, out=np.zeros(depth_m.shape, np.float32), where=known)
 
@@ -120,8 +123,10 @@ def _told_px(message: Any) -> Disparity:  # noqa: ANN401
     return np.where(valid, found, np.float32(0))
 
 
-def _baseline(camera: CameraMap, facts: Facts, projection: NDArray[np.float64], right_info: Info | None) -> float:
-    if camera.baseline_m is not None:
+def _baseline(
+    camera: CameraMap, facts: Facts, projection: NDArray[np.float64], right_info: Info | None
+) -> float | None:
+    if camera.is_single or camera.baseline_m is not None:
         return camera.baseline_m
     if right_info is not None:
         return baseline_m(projection, right_info.projection(rectified=camera.rectified))
@@ -132,7 +137,7 @@ def _baseline(camera: CameraMap, facts: Facts, projection: NDArray[np.float64], 
 def _place(camera: CameraMap, vehicle: VehicleMap, facts: Facts) -> Extrinsics:
     place = camera.extrinsics
     if place is None:
-        frame = camera.frame or facts.frames[camera.image or camera.depth_topic]
+        frame = camera.frame or facts.frames[camera.image or camera.main_topic]
         place = extrinsics_of(facts.transforms.lookup(vehicle.frame, frame))
     return place.model_copy(update={"x_m": place.x_m + vehicle.rear_axle_m, "z_m": place.z_m + vehicle.height_m})
 
@@ -145,10 +150,11 @@ def _require_size(facts: Facts, topic: str, info: Info, told_by: str | None) -> 
 
 
 def _require_agreement(facts: Facts, topic: str, calibration: CameraCalibration) -> None:
-    stereo = facts.stereo[topic]
+    stereo, baseline = facts.stereo[topic], calibration.baseline_m
+    assert baseline is not None
     for name, told, known, share, unit in (
         ("f", stereo.f_px, calibration.fx_px, _FOCAL_SHARE, "px"),
-        ("t", stereo.baseline_m, calibration.baseline_m, _BASELINE_SHARE, "m"),
+        ("t", stereo.baseline_m, baseline, _BASELINE_SHARE, "m"),
     ):
         if abs(told - known) > share * known:
             raise InputError(f"{name} is {told:g} {unit}, but the calibration says {known:g} {unit}", field=topic)

@@ -99,7 +99,7 @@ class Camera(Eye):
 
     def disparity_px(self, depth_m: Float32s) -> Float32s:
         """Return the disparity of depths; that of the sky is 0."""
-        return (self.calibration.fx_px * self.calibration.baseline_m / depth_m).astype(np.float32)
+        return (self.calibration.depth_disparity_m_px / depth_m).astype(np.float32)
 
 
 class RayCaster:

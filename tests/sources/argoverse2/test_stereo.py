@@ -11,7 +11,7 @@ from support.argoverse_log import (
     STEREO_OFFSET_NS,
     STEREO_SIZE,
     STEREO_STEP_NS,
-    stereo_tables,
+    camera_tables,
     write_argoverse,
     write_small_images,
     write_table,
@@ -85,7 +85,7 @@ def test_the_camera_is_where_the_left_one_is_above_the_ground(folder):
 
 def test_the_lens_of_which_images_are_rid_is_not_undone_again(folder):
     before = StereoCamera(folder).calibration
-    table = stereo_tables()[0]
+    table = camera_tables()[0]
     for name in ("k1", "k2", "k3"):
         del table[name]
     write_table(folder / "calibration" / "intrinsics.feather", table)
@@ -109,12 +109,10 @@ def test_every_second_pair_is_taken_and_none_if_so_asked(folder, tmp_path):
     assert frames(tmp_path, stereo_every=0)[0] == ()
 
 
-def test_the_remark_says_how_to_get_labels_and_what_is_left_out(folder, tmp_path):
-    (folder / "sensors" / "cameras" / "ring_front_center").mkdir()
-    summary = converted(tmp_path)
-    assert summary.remark == (
-        f"no labels for stereo_front_left of 1 logs: add them with semgrid-eval segment {tmp_path / 'logs'} "
-        "--model NETWORK.onnx --out LABELLED; images of ring cameras left out, as nothing tells their depth, in 1 logs"
+def test_the_remark_says_how_to_get_labels(folder, tmp_path):
+    assert converted(tmp_path).remark == (
+        f"no labels for the cameras of 1 logs: add them with semgrid-eval segment {tmp_path / 'logs'} "
+        "--model NETWORK.onnx --out LABELLED"
     )
 
 
@@ -148,7 +146,7 @@ def cut(folder):
 
 def with_intrinsics(change):
     def damage(folder):
-        table = stereo_tables()[0]
+        table = camera_tables()[0]
         change(table)
         write_table(folder / "calibration" / "intrinsics.feather", table)
 
@@ -156,7 +154,7 @@ def with_intrinsics(change):
 
 
 def other_way_round(folder):
-    table = stereo_tables()[1]
+    table = camera_tables()[1]
     table["sensor_name"].reverse()
     write_table(folder / "calibration" / "egovehicle_SE3_sensor.feather", table)
 

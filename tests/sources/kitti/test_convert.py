@@ -77,13 +77,34 @@ def test_a_pair_of_images_becomes_a_camera_with_disparity(tmp_path):
     assert (disparity_px > 0).mean() > 0.5
 
 
-def test_images_without_their_pair_and_scans_without_labels_are_told(tmp_path):
+def test_left_images_alone_are_a_camera_without_disparity(tmp_path):
     folder = Sequence(images=True, labels=None).write(tmp_path / "src")
     shutil.rmtree(folder / "image_3")
-    told = "scans without labels, of which no grid can be made: 03; no pairs of images, so no camera: 03"
-    assert converted(tmp_path).remark == told
+    told = "scans without labels, which a camera has to colour: 03; no right images, so no disparity: 03; no labels for"
+    assert converted(tmp_path).remark.startswith(told)
     with LogReader(find_logs(tmp_path / "logs")[0]) as log:
         assert next(log.sweeps("top")).label_id is None
+        calibration = log.calibration("left")
+        frames = list(log.frames("left", images=True))
+    assert (calibration.fx_px, calibration.baseline_m) == (pytest.approx(FOCAL_PX), None)
+    assert [each.image_file for each in frames] == [
+        (folder / "image_2" / f"{number:06d}.png").read_bytes() for number in range(4)
+    ]
+    assert {each.disparity_png for each in frames} == {None}
+
+
+def test_right_images_alone_are_no_camera(tmp_path):
+    folder = Sequence(images=True).write(tmp_path / "src")
+    shutil.rmtree(folder / "image_2")
+    assert converted(tmp_path).remark == "no images, so no camera: 03"
+
+
+def test_left_images_without_scans_are_refused(tmp_path):
+    folder = Sequence(images=True).write(tmp_path / "src")
+    for name in ("image_3", "velodyne"):
+        shutil.rmtree(folder / name)
+    summary = convert_kitti(KittiOptions(src=tmp_path / "src"), tmp_path / "logs")
+    assert list(summary.failed.values()) == [f"{folder}: holds neither scans nor pairs of images"]
 
 
 def test_images_alone_are_enough(tmp_path):

@@ -149,19 +149,35 @@ def test_pairs_are_matched_and_a_camera_that_looks_right_is_one_of_its_own(tmp_p
     assert told["right"]["depth"] == "/right/depth"
 
 
-def test_a_camera_without_depth_or_calibration_is_left_out_and_the_others_stay(tmp_path):
-    messages = [*rig(front=Mount()), info("/rear/info"), image("/rear/image", "rear"), image("/side/image", "side")]
-    text = drafted(tmp_path, messages)
+def test_a_camera_without_calibration_is_left_out_and_the_others_stay(tmp_path):
+    text = drafted(tmp_path, [*rig(front=Mount()), image("/side/image", "side")])
     assert list(cameras(text)) == ["front"]
-    assert "# /rear/image: nothing in the bag tells its depth: left out.\n" in text
-    assert "# /side/image: no CameraInfo of its size is in the bag: left out.\n" in text
+    assert "# /side/image: no CameraInfo of its own is in the bag: left out.\n" in text
     ended = run_command(["convert", "ros2", f"{tmp_path}/drive", f"{tmp_path}/logs", "--map", f"{tmp_path}/map.yaml"])
     assert ended.code == 0, ended.err
 
 
-def test_alone_it_stays_and_what_is_not_known_is_left_open(tmp_path):
-    text = drafted(tmp_path, [motion(), info("/rear/info"), image("/rear/image", "rear")])
-    assert "    disparity:  # nothing in the bag tells it: disparity, depth, or a right image whose" in text
+def test_a_camera_without_depth_is_drafted_with_what_it_is_good_for_beside_others_and_alone(tmp_path):
+    rear = [
+        info("/rear/info"),
+        image("/rear/image", "rear"),
+        sent("/tf_static", camera_link("rear", ONE.calibration())),
+    ]
+    told = "    # Nothing in the bag tells its depth (disparity, depth, or a right image whose CameraInfo has"
+    alone, beside = tmp_path / "alone", tmp_path / "beside"
+    for here, others in ((alone, [motion()]), (beside, [*rig(front=Mount()), image("/side/image", "side")])):
+        here.mkdir()
+        text = drafted(here, [*others, *rear])
+        assert told in text
+    assert cameras(text)["rear"] == {"info": "/rear/info", "image": "/rear/image"}
+    assert text.count(told) == 1
+    ended = run_command(f"convert ros2 {beside}/drive {beside}/logs --map {beside}/map.yaml --workers 1".split())
+    assert "Error: " in ended.err, "a single frame is no recording"
+
+
+def test_what_is_not_known_of_the_only_camera_is_left_open(tmp_path):
+    text = drafted(tmp_path, [motion(), image("/rear/image", "rear")])
+    assert "    info:  # no CameraInfo of its size in the bag" in text
 
 
 @pytest.mark.parametrize(

@@ -251,11 +251,11 @@ def map_fault(here, text):
     ("old", "new", "said"),
     [
         ("disparity: /s", "disparty: /s", "cameras.front.disparty: unknown key; allowed here: baseline_m, depth, "),
-        ("    disparity: /stereo/disparity\n", "", "one of disparity, depth and right is needed, not none"),
+        ("    disparity: /stereo/disparity\n", "", "right_info needs one of disparity, depth, right"),
         (
             "disparity:",
             "depth: /d\n    disparity:",
-            "one of disparity, depth and right is needed, not disparity and de",
+            "one of disparity, depth, right at most, not disparity and depth",
         ),
         ("ids: label_ids", "ids: {rode: [1]}", "'rode' is not one of unlabeled, "),
         ("ids: label_ids", "ids: {road: [1], car: [2, 1]}", "ids: 1 is given to road and to car"),

@@ -64,18 +64,24 @@ def test_frames_far_from_motion_are_left_out():
 
 def test_recordings_end_where_frames_are_missing():
     lost = Counter()
-    found = stretches({"front": plans([0, 50, 100, 200, 250, 400, 500, 550])}, 0.0, lost)
+    found = stretches({"front": plans([0, 50, 100, 200, 250, 400, 500, 550])}, set(), 0.0, lost)
     assert numbers(found) == [(0, [0, 50, 100]), (3, [200, 250]), (6, [500, 550])]
     assert lost["alone between holes"] == 1
 
 
 def test_long_stretches_are_cut_into_equal_parts():
-    found = stretches({"front": plans(range(0, 1000, 50))}, 0.4, Counter())
+    found = stretches({"front": plans(range(0, 1000, 50))}, set(), 0.4, Counter())
     assert [first for first, _ in found] == [0, 7, 13]
     assert sum(len(frames) for _, frames in found) == 20
 
 
 def test_a_hole_of_one_camera_ends_the_recording_of_all():
     front, rear = plans(range(0, 500, 50)), plans([10, 60, 110, 310, 360, 410], "rear")
-    found = numbers(stretches({"front": front, "rear": rear}, 0.0, Counter()))
+    found = numbers(stretches({"front": front, "rear": rear}, set(), 0.0, Counter()))
     assert found == [(0, [0, 10, 50, 60, 100, 110, 150, 200, 250, 300]), (7, [310, 350, 360, 400, 410, 450])]
+
+
+def test_a_hole_of_a_single_camera_ends_nothing():
+    front, rear = plans(range(0, 500, 50)), plans([10, 60, 110, 310, 360, 410], "rear")
+    ((first, frames),) = stretches({"front": front, "rear": rear}, {"rear"}, 0.0, Counter())
+    assert (first, len(frames)) == (0, 16)

@@ -19,6 +19,7 @@ from semgrid_eval.recording.types import Recording
 
 CONVERT = "convert ros2 drive logs --map map.yaml --workers 1"
 PLACES = ((6.0, 2.0), (9.0, -3.0), (12.0, 1.0))
+DISPARITY, PICTURES = "    disparity: /front/disparity\n", "    labels: /front/labels\n    image: /front/image\n"
 LATE_NS = 3600 * 10**9
 Change = Callable[[Any], Any]
 
@@ -143,6 +144,8 @@ BAGS = Kind(
     (
         _mapped("a topic that is not in the bag", "/odom", "/odometry"),
         _mapped("a LiDAR whose topic is not in the bag", "/top/points", "/velodyne_points"),
+        _mapped("a camera with neither images nor labels", f"{DISPARITY}{PICTURES}", ""),
+        _mapped("a baseline where nothing tells the depth", DISPARITY, "    baseline_m: 0.5\n"),
         _mapped("a LiDAR whose topic holds images", "/top/points", "/front/image"),
         _bag("a message type that is not known", _strange),
         _changed("a clock that jumps by an hour", "/odom", _late, last=True),

@@ -8,15 +8,18 @@ from typing import Any
 
 import numpy as np
 from support.argoverse_log import (
+    RING,
+    STEREO,
+    camera_tables,
     columns,
     pose_columns,
-    stereo_tables,
     write_argoverse,
     write_small_images,
     write_table,
 )
 from support.bad.case import Bad, Kind
 from support.kitti_tree import Sequence
+from support.single import single_rig
 from support.swept import recorded, sweep
 from support.toy_world import street
 
@@ -27,14 +30,16 @@ ARGOVERSE = "convert argoverse2 AV new --workers 1"
 FOLDER = Path("KITTI/sequences/03")
 BOXES, POSES = (Path("AV/val/drive", name) for name in ("annotations.feather", "city_SE3_egovehicle.feather"))
 
+RING_LEFT = "ring_rear_left"
 IMAGES, INTRINSICS = Path("AV/val/drive/sensors/cameras"), Path("AV/val/drive/calibration/intrinsics.feather")
 
 
 def whole() -> None:
     """Write a sequence of each data set, and logs of which one has bare sweeps, one images without labels, too."""
     Sequence().write(Path("KITTI"))
-    write_argoverse(Path("AV"), stereo=True)
+    write_argoverse(Path("AV"), stereo=True, ring=True)
     write_log(street(1, frames=4).recording(), Path("camera/a.mcap"))
+    write_log(single_rig(frames=4), Path("single/a.mcap"))
     for folder, calibrations in (("bare", {}), ("unlabelled", {"front": street(1).calibration()})):
         recording = recorded(lambda seen=bool(calibrations): _moments(seen=seen))
         write_log(replace(recording, calibrations=calibrations), Path(folder, "a.mcap"))
@@ -75,8 +80,8 @@ def _cell(column: str, value: object) -> Callable[[dict[str, list[Any]]], object
     return lambda table: table[column].__setitem__(5, value)
 
 
-def _others(table: dict[str, list[Any]]) -> None:
-    table["sensor_name"] = [name.replace("stereo", "ring") for name in table["sensor_name"]]
+def _intrinsics(words: str, cameras: dict[str, Any]) -> Bad:
+    return _table(words, INTRINSICS, lambda: camera_tables(cameras)[0], lambda table: None)
 
 
 def _grid(words: str, logs: str, sensor: str) -> Bad:
@@ -86,7 +91,7 @@ def _grid(words: str, logs: str, sensor: str) -> Bad:
 
 DRIVES = Kind(
     "Drives of SemanticKITTI and Argoverse",
-    "A sequence of four scans with labels, and a drive of six times with boxes and images of the stereo pair.",
+    "A sequence of four scans with labels, and a drive of six times with boxes and images of stereo pair and ring.",
     whole,
     (
         _file("labels of another count than points", "labels/000001.label", _ids(40)),
@@ -102,12 +107,19 @@ DRIVES = Kind(
         Bad("one camera of the stereo pair", ARGOVERSE, spoil=lambda: rmtree(IMAGES / "stereo_front_right")),
         Bad("images of another size than the calibration", ARGOVERSE, spoil=lambda: write_small_images(IMAGES)),
         Bad("images without calibration", ARGOVERSE, spoil=INTRINSICS.unlink),
-        _table("images of a camera that is not calibrated", INTRINSICS, lambda: stereo_tables()[0], _others),
+        _intrinsics("images of the pair that is not calibrated", RING),
+        _intrinsics("images of ring cameras that are not calibrated", STEREO),
+        Bad(
+            "images of a ring camera of another size",
+            ARGOVERSE,
+            spoil=lambda: write_small_images(IMAGES, RING_LEFT),
+        ),
     ),
 )
 GRIDS = Kind(
     "Grids of LiDARs",
-    "A grid's sensors, asked of a log with a camera, with sweeps without labels, and with these and a camera without.",
+    "A grid's sensors, asked of a log with a camera, with sweeps without labels, with these and a camera without, and "
+    "with two cameras without disparity.",
     whole,
     (
         _grid("a LiDAR, where there is none", "camera", "{kind: lidar}"),
@@ -118,6 +130,10 @@ GRIDS = Kind(
         _grid("points coloured by a camera, where there is none", "bare", "{kind: lidar, colour_from: {}}"),
         _grid("points coloured by an absent camera", "unlabelled", "{kind: lidar, colour_from: {camera: rear}}"),
         _grid("points coloured by a camera without labels", "unlabelled", "{kind: lidar, colour_from: {}}"),
+        _grid("points of a camera without disparity", "single", "{camera: left}"),
+        _grid("points coloured by one of two cameras, not named", "single", "{kind: lidar, colour_from: {}}"),
+        _grid("points coloured by no camera", "single", "{kind: lidar, colour_from: {camera: []}}"),
+        _grid("a second camera to colour points, absent", "single", "{kind: lidar, colour_from: {camera: [left, up]}}"),
         _grid("colour_from is a name", "unlabelled", "{kind: lidar, colour_from: front}"),
         _grid("colours of a time too long ago", "unlabelled", "{kind: lidar, colour_from: {within_s: 5}}"),
     ),

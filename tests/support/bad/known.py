@@ -22,7 +22,8 @@ from support.bad import (
 )
 
 KINDS = (
-    *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, axes.KIND, matrices.STREAM, class_sets.KIND, on_logs.KIND),
+    *(yaml_files.YAML, matrices.MATRIX, matrices.ROW, axes.KIND, matrices.STREAM, class_sets.KIND),
+    *on_logs.KINDS,
     *latencies.KINDS,
     *(own_models.MODEL, predictions.KIND, contracts.CONTRACT),
     *(*cityscapes.KINDS, *bags.KINDS, *drives.KINDS),

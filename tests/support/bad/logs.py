@@ -14,6 +14,7 @@ from mcap.writer import Writer
 from support.bad.case import Bad, Kind
 from support.damage import CHUNK, flipped, stretches
 from support.driving import driving
+from support.single import single
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.log import topics
@@ -23,7 +24,7 @@ from semgrid_eval.log.schemas.stereo_calibration_pb2 import StereoCalibration
 from semgrid_eval.log.store import write_log
 from semgrid_eval.log.writer import MessageWriter
 from semgrid_eval.recording.png import encode_gray
-from semgrid_eval.recording.types import Moment
+from semgrid_eval.recording.types import Moment, Recording
 
 FOUND = Path(__file__).parents[2] / "corpus" / "log"
 LOG, GRIDS = Path("logs/a.mcap"), "grids logs out --workers 1"
@@ -51,9 +52,13 @@ def _moments() -> Iterator[Moment]:
         yield replace(moment, motion=(sample,), cameras={"front": replace(full, stamp_ns=moment.stamp_ns)})
 
 
+def _whole() -> Recording:
+    return replace(driving(), moments=_moments)
+
+
 def whole() -> None:
     """Write a good log of four frames."""
-    write_log(replace(driving(), moments=_moments), LOG)
+    write_log(_whole(), LOG)
 
 
 Message = Callable[[str, bytes], bytes | None]
@@ -173,6 +178,7 @@ KIND = Kind(
             lambda: again(_decoded(topics.camera_topic("front", topics.STEREO), StereoCalibration, baseline_m=0.0)),
         ),
         _log("no disparity", lambda: again(_without(DISPARITY))),
+        _log("a camera without disparity alone", lambda: write_log(single(_whole()), LOG)),
         _log("no labels", lambda: again(_without(LABEL))),
         _log("no motion", lambda: again(_without(MOTION))),
         _log("motion that cannot be decoded", lambda: again(_broken(MOTION, b"\xff\xff"))),
@@ -206,6 +212,7 @@ KIND = Kind(
             lambda: (Path("out").mkdir(), shutil.copy(LOG, "out")),
             "check logs --recover out",
         ),
+        _log("`latency`: a camera without disparity", lambda: write_log(single(_whole()), LOG), LATENCY),
         _log("`latency`: no motion", lambda: again(_without(MOTION)), LATENCY),
         _log("`latency`: no labels", lambda: again(_without(LABEL)), LATENCY),
         _log("`latency --right`: an image too few", lambda: _right(3), f"{LATENCY} --right right"),
