@@ -21,6 +21,7 @@ from semgrid_eval.recording.colour import ImageSize
 from semgrid_eval.recording.lidar import LidarSweep
 from semgrid_eval.recording.road_map import RoadMap
 from semgrid_eval.recording.types import Actor, CameraCalibration, CameraFrame, Moment, MotionSample, Pose, Quantity
+from semgrid_eval.words import plural
 
 T = TypeVar("T")
 _DECODERS: dict[str, Callable[[bytes], Any]] = {
@@ -138,7 +139,9 @@ class LogReader(Container):
             LogError: there are more or fewer.
         """
         if count != self.message_count:
-            raise LogError(f"holds {count} messages, but its index states {self.message_count}", path=self.path)
+            raise LogError(
+                f"holds {plural(count, 'message')}, but its index states {self.message_count}", path=self.path
+            )
 
     def calibration(self, camera: str) -> CameraCalibration:
         """Return the calibration of a camera; one without baseline has no disparity either."""

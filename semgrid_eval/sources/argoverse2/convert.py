@@ -15,6 +15,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs, how_to_label
 from semgrid_eval.sources.argoverse2.drive import Drive
 from semgrid_eval.sources.argoverse2.source import ArgoverseOptions
+from semgrid_eval.words import plural
 
 SPLITS = ("train", "val", "test")
 
@@ -52,4 +53,4 @@ def _drives(options: ArgoverseOptions) -> list[Drive]:
 def _remark(drives: list[Drive], out: Path) -> str:
     """Say in one line what is not there."""
     seen = sum(bool(drive.pairs or drive.rings) for drive in drives)
-    return f"no labels for the cameras of {seen} logs: {how_to_label(out)}" if seen else ""
+    return f"no labels for the cameras of {plural(seen, 'log')}: {how_to_label(out)}" if seen else ""

@@ -13,6 +13,7 @@ from semgrid_eval.sources.ros2.inspection import inspect_bags
 from semgrid_eval.sources.ros2.mapping import BagMap, load_map
 from semgrid_eval.sources.ros2.options import Ros2Options
 from semgrid_eval.sources.ros2.plan import BagPlan, Cut, plan_bag, told
+from semgrid_eval.words import plural
 
 _TOLD_AT_M = 50.0
 
@@ -64,7 +65,7 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
     parts = [f"Warning: {odd}" for odd in next((plan.odd_times for plan in plans if plan.odd_times), [])]
     parts += [f"{kept} of {total} {what}; {told(lost)}", *_codings(plans[0])]
     if repeated := sum(plan.repeated for plan in plans):
-        parts.append(f"{repeated} messages with a stamp that was there before left out")
+        parts.append(f"{plural(repeated, 'message')} with a stamp that was there before left out")
     if mapping.single:
         worth = "labels of theirs can colour the points of a LiDAR: `colour_from` of the sensor"
         parts.append(f"nothing tells the depth of {', '.join(sorted(mapping.single))}; {worth}")
