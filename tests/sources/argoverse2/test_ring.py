@@ -64,7 +64,7 @@ def frames(log, name):
 
 def test_files_are_untouched_and_have_their_own_times(folder, tmp_path):
     log, summary = converted(tmp_path, ring_every=1)
-    assert summary.remark.startswith("no labels for the cameras of 1 logs: add them with semgrid-eval segment")
+    assert summary.remark.startswith("no labels for the cameras of 1 log: add them with semgrid-eval segment")
     with LogReader(log) as reader:
         assert reader.scene.cameras == (FRONT, REAR)
         assert [reader.is_single(name) for name in RING] == [True, True]

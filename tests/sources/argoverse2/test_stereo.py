@@ -111,7 +111,7 @@ def test_every_second_pair_is_taken_and_none_if_so_asked(folder, tmp_path):
 
 def test_the_remark_says_how_to_get_labels(folder, tmp_path):
     assert converted(tmp_path).remark == (
-        f"no labels for the cameras of 1 logs: add them with semgrid-eval segment {tmp_path / 'logs'} "
+        f"no labels for the cameras of 1 log: add them with semgrid-eval segment {tmp_path / 'logs'} "
         "--model NETWORK.onnx --out LABELLED"
     )
 
