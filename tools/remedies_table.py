@@ -1,7 +1,8 @@
 """Print the table of docs/remedies.md: scores of rows on different grids, what is known of their targets, and the cost.
 
-Areas are those of the targets, as shares of the first row's. The cost is the processor time that one frame's grid takes
-on this machine, decoding included: the least of some logs, which are built again.
+The way is that from BL-DC to the ceiling on the same grid, by the mean. Areas are those of the targets, as shares of the
+first row's. The cost is the processor time that one frame's grid takes on this machine, decoding included: the least of
+some logs, which are built again.
 
 Example: python tools/remedies_table.py build/remedies/run build/logs/val
 """
@@ -15,7 +16,11 @@ from pathlib import Path
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import find_logs
+from semgrid_eval.report.estimates.bootstrap import Resampling, score_regions
+from semgrid_eval.report.estimates.division import EVERYWHERE
+from semgrid_eval.report.estimates.way import ways
 from semgrid_eval.report.rows.load import Row, load_runs
+from semgrid_eval.report.rows.pairing import HEADLINE
 from semgrid_eval.scores.metrics.iou import class_iou
 from semgrid_eval.scores.metrics.table import IOU
 
@@ -31,10 +36,11 @@ LOGS = 3
 
 def lines(rows: Sequence[Row], logs: Sequence[Path]) -> Iterator[str]:
     """Make the table in Markdown, line by line."""
-    head = ["row", *COLUMNS.values(), *(f"area {name}" for name in COLUMNS.values()), "ms a frame"]
+    names = COLUMNS.values()
+    head = ["row", *names, "way to the ceiling", *(f"area {name}" for name in names), "ms a frame"]
     yield "| " + " | ".join(head) + " |"
     yield "|---|" + "---|" * (len(head) - 1)
-    plain, costs = areas_m2(rows[0]), dict[str, float]()
+    plain, costs, way = areas_m2(rows[0]), dict[str, float](), shares_of_way(rows)
     for row in rows:
         grid = grid_of(row)
         cost_ms = costs.setdefault(grid.model_dump_json(), -1.0)
@@ -43,7 +49,14 @@ def lines(rows: Sequence[Row], logs: Sequence[Path]) -> Iterator[str]:
         scores = IOU.means(class_iou(row.results[0].counts.sum(axis=0)))
         values = [f"{scores[name]:.3f}".removeprefix("0") for name in COLUMNS]
         shares = [f"{area_m2 / of:.0%}" for area_m2, of in zip(areas_m2(row), plain, strict=True)]
-        yield f"| {' | '.join([row.name, *values, *shares, f'{cost_ms:.1f}'])} |"
+        yield f"| {' | '.join([row.name, *values, way.get(row.name, '-'), *shares, f'{cost_ms:.1f}'])} |"
+
+
+def shares_of_way(rows: Sequence[Row]) -> dict[str, str]:
+    """Return each row's share of the way from BL-DC to the ceiling, by the mean, with its interval."""
+    scores = score_regions(rows, IOU, EVERYWHERE, Resampling())["all"]
+    found = {entry.row.name: way.share(entry, HEADLINE) for entry, way in ways(scores)}
+    return {name: f"{each.value:.0%} ({each.low:.0%} to {each.high:.0%})" for name, each in found.items()}
 
 
 def areas_m2(row: Row) -> list[float]:
