@@ -26,6 +26,7 @@ from semgrid_eval.streams.untrained import TimedModel, timed_model
 from semgrid_eval.windows.data import WindowSet, select_windows
 from semgrid_eval.windows.grids import stack_recordings
 from semgrid_eval.windows.plan import training_windows
+from semgrid_eval.words import plural
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def measure_chain(
                 if found.frames == amount.frames:
                     return found
     if not found.frames:
-        seen = f"frames of the logs with all inputs ({WINDOW.span_frames} frames back): {whole}"
+        seen = f"the logs hold {plural(whole, 'frame')} with all inputs ({WINDOW.span_frames} frames back)"
         raise InputError(f"{amount.warm_up} leaves no frame to measure: {seen}; give more logs", field="warm_up")
     return found
 

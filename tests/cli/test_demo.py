@@ -6,7 +6,7 @@ from click.testing import CliRunner
 from support.toy_world import street
 
 from semgrid_eval.cli.main import cli
-from semgrid_eval.errors import ConfigError
+from semgrid_eval.errors import InputError
 from semgrid_eval.log.convert import ConversionSummary
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs import matrix
@@ -46,5 +46,5 @@ def test_what_fails_is_named_and_the_rest_is_shown(toy):
 
 
 def test_a_seed_that_no_town_has_is_one_line():
-    with pytest.raises(ConfigError, match="seed: "):
+    with pytest.raises(InputError, match="--seed: must be below"):
         CliRunner().invoke(cli, ["demo", "--seed", "3000000000"], standalone_mode=False, catch_exceptions=False)

@@ -83,7 +83,7 @@ def test_warm_up_and_number_of_frames_count_over_all_logs(log):
     found = measure_chain([log], chain, Amount(2, 1), clock=ticking(), progress=lambda *said: told.append(said))
     assert found.frames == 2
     assert told == [(1, 2, "toy"), (2, 2, "toy")]
-    with pytest.raises(InputError, match=rf"warm_up: 7 leaves no frame to measure: {WHOLE} frames"):
+    with pytest.raises(InputError, match=rf"warm_up: 7 leaves no frame to measure: the logs hold {WHOLE} frames"):
         measure_chain([log], chain, Amount(2, WHOLE), clock=ticking())
 
 
