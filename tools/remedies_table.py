@@ -1,8 +1,8 @@
 """Print the table of docs/remedies.md: scores of rows on different grids, what is known of their targets, and the cost.
 
 The way is that from BL-DC to the ceiling on the same grid, by the mean. Areas are those of the targets, as shares of
-the first row's. The cost is the processor time that one frame's grid takes on this machine, decoding included: the least
-of some logs, which are built again.
+the first row's. The cost is the processor time that one frame's grid takes on this machine, decoding included:
+the least of some logs, which are built again.
 
 Example: python tools/remedies_table.py build/remedies/run build/logs/val
 """
