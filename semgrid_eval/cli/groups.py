@@ -16,7 +16,8 @@ _INVOKED = f"{__name__}.invoked"
 
 def option_of(error: InputError, ctx: click.Context) -> str | None:
     """Return the option of the command that was invoked, as it is typed, that an error of no file is of, if it is."""
-    option, command = f"--{(error.field or '').replace('_', '-')}", ctx.meta.get(_INVOKED)
+    name = (error.field or "").partition(".")[0]  # what follows is a place in its value
+    option, command = f"--{name.replace('_', '-')}", ctx.meta.get(_INVOKED)
     is_option = command is not None and any(option in each.opts for each in command.params)
     return option if error.path is None and is_option else None
 

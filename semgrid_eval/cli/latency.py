@@ -21,6 +21,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 _MODEL = "One of `run`'s models, or path.py:Class; may be given several times."
 _SEGMENT = "ONNX file of a segmentation network that makes the labels; the next options are its own."
 _RIGHT = "Folder of right images, FOLDER/<recording>/*.png in the order of frames; disparity is matched then."
+_CAMERA = "Whose frames are taken, where several cameras of a log have disparity."
 _PROCESSOR = "Count processor time, on one thread of a CPU: what the chain takes where nothing else runs."
 _SHOWN = ("processor", "cores", "threads", "device", "gpu", "clock")
 
@@ -33,6 +34,7 @@ _SHOWN = ("processor", "cores", "threads", "device", "gpu", "clock")
         click.Option(["--segment"], type=FILE_THERE, help=_SEGMENT),
         *parameters_of(SegmentationConfig),
         click.Option(["--right"], type=FOLDER, help=_RIGHT),
+        click.Option(["--camera"], help=_CAMERA),
         click.Option(["--frames"], type=Whole(1, 100_000), default=300, show_default=True, help="At most."),
         click.Option(
             ["--warm-up"], type=Whole(0), default=20, show_default=True, help="Frames before those that count."

@@ -24,8 +24,6 @@ from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment,
 
 CHUNK_BYTES = 1 << 20
 LIBRARY = f"semgrid-eval/{__version__}"
-_CALIBRATED = (topics.DISPARITY, topics.IMAGE, topics.LABEL)
-"""Channels whose pictures have the size that a camera is calibrated for; the first that a frame has tells it."""
 
 
 def open_writer(stream: BinaryIO) -> Writer:
@@ -127,6 +125,7 @@ class MomentWriter:
         self._recording = recording
         self._ego_motion = EgoMotion()  # as far as it is known by each moment
         self._palette = label_palette()
+        self._sizes_px: dict[str, ImageSize] = {}  # that cameras are calibrated for
         self._last_ns = -1
 
     def write(self) -> None:
@@ -187,7 +186,7 @@ class MomentWriter:
             if (png := getattr(frame, field)) is not None
         }
         sizes = {channel: self._whole(camera, channel, png, frame.stamp_ns) for channel, png in pictures.items()}
-        size_px = next(sizes[channel] for channel in _CALIBRATED if channel in sizes)
+        size_px = self._calibrated_px(camera, frame.stamp_ns, sizes)
         known, rest = calibration_messages(frame.stamp_ns, camera, calibration, size_px)
         self._writer.write(camera_topic(camera, topics.CALIBRATION), known, log_ns=frame.stamp_ns)
         self._writer.write(camera_topic(camera, topics.STEREO), rest, log_ns=frame.stamp_ns)
@@ -199,6 +198,16 @@ class MomentWriter:
             message = codec.image_message(frame.stamp_ns, camera, shown)
             self._writer.write(camera_topic(camera, channel), message, log_ns=frame.stamp_ns, notes=notes[channel])
         self._writer.end_chunk()
+
+    def _calibrated_px(self, camera: str, stamp_ns: int, sizes: dict[str, ImageSize]) -> ImageSize:
+        """Return the size that a calibration holds for: that of disparity or image, of labels where none came yet."""
+        channel = next((each for each in (topics.DISPARITY, topics.IMAGE) if each in sizes), topics.LABEL)
+        known_px = self._sizes_px.setdefault(camera, sizes[channel])
+        if channel != topics.LABEL and sizes[channel] != known_px:
+            place = f"{self._recording.name}: {camera_topic(camera, channel)} at {stamp_ns} ns"
+            found = f"is {sizes[channel].width} x {sizes[channel].height}"
+            raise InputError(f"{found}; pictures before it are {known_px.width} x {known_px.height}", field=place)
+        return known_px
 
     def _sweep(self, lidar: str, sweep: LidarSweep) -> None:
         message = sweep_message(sweep)

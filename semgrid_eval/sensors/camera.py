@@ -2,7 +2,7 @@
 
 import heapq
 import operator
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
@@ -15,7 +15,6 @@ from semgrid_eval.sensors.sensor import Points, SensorConfig
 
 if TYPE_CHECKING:
     from semgrid_eval.log.reader import LogReader
-    from semgrid_eval.recording.types import CameraCalibration
 
 _SIZE_PX = (16, 8192)
 
@@ -75,9 +74,7 @@ def read_cameras(
     """Iterate over what parts of cameras' images see, each image decoded once, as `Kind` says."""
     by_camera: dict[str, dict[str, CameraSensor]] = {}
     for name, sensor in sensors.items():
-        by_camera.setdefault(log.choose_camera(sensor.camera), {})[name] = sensor
-    for camera in by_camera:
-        require_disparity(log, camera)
+        by_camera.setdefault(stereo_camera(log, sensor.camera), {})[name] = sensor
     streams = [_read_camera(log, camera, parts, class_by_label) for camera, parts in by_camera.items()]
     return heapq.merge(*streams, key=lambda points: points.stamp_ns)
 
@@ -86,21 +83,31 @@ def camera_frames(log: "LogReader", sensor: CameraSensor) -> str:
     """Return the topic of what every frame of a sensor's camera has.
 
     Raises:
-        LogError: there is no such camera, or it has no disparity.
+        LogError: as `stereo_camera` says.
     """
-    camera = log.choose_camera(sensor.camera)
-    require_disparity(log, camera)
-    return camera_topic(camera, DISPARITY)
+    return camera_topic(stereo_camera(log, sensor.camera), DISPARITY)
 
 
-def require_disparity(log: "LogReader", camera: str) -> "CameraCalibration":
-    """Return the calibration of a camera; a LogError says that it has no disparity, and what it can do without."""
-    calibration = log.calibration(camera)
-    if calibration.baseline_m is None:
-        advice = f"it can colour a LiDAR's points: {{kind: lidar, colour_from: {{camera: {camera}}}}}"
-        fault = f"has no disparity, so nothing tells where in a grid its pixels belong; {advice}"
-        raise LogError(fault, path=log.path, field=f"camera {camera}")
-    return calibration
+def stereo_camera(log: "LogReader", wanted: str | None) -> str:
+    """Return the camera that is wanted, or the log's only one with disparity where none is.
+
+    Raises:
+        LogError: there is no such camera, it has no disparity, or none is wanted and several have it, or none has.
+    """
+    cameras = log.scene.cameras if wanted is None else (log.choose_camera(wanted),)
+    stereo = [camera for camera in cameras if not log.is_single(camera)]
+    if cameras and not stereo:
+        raise LogError(_without_disparity(cameras), path=log.path, field=f"camera {', '.join(cameras)}")
+    return stereo[0] if len(stereo) == 1 else log.choose_camera(wanted)
+
+
+def _without_disparity(cameras: Sequence[str]) -> str:
+    fault = "has no disparity, so nothing tells where in a grid its pixels belong; it"
+    names = cameras[0]
+    if len(cameras) > 1:
+        fault = "have no disparity, so nothing tells where in a grid their pixels belong; they"
+        names = f"[{', '.join(cameras)}]"
+    return f"{fault} can colour a LiDAR's points: {{kind: lidar, colour_from: {{camera: {names}}}}}"
 
 
 def _read_camera(

@@ -20,7 +20,7 @@ from semgrid_eval.progress import Progress, silent
 from semgrid_eval.segmentation.config import SegmentationConfig
 from semgrid_eval.segmentation.network import SegmentationNetwork
 from semgrid_eval.streams.laps import Clock, Laps, Measured
-from semgrid_eval.streams.live import GIVEN, GRID, WINDOW, Chain, LiveLog
+from semgrid_eval.streams.live import GIVEN, GRID, WINDOW, Chain, LiveLog, grid_of
 from semgrid_eval.streams.profile import LatencyProfile, MadeBy
 from semgrid_eval.streams.untrained import TimedModel, timed_model
 from semgrid_eval.windows.data import WindowSet, select_windows
@@ -45,6 +45,7 @@ class Parts:
     segment: Path | None = None  # ONNX file of a segmentation network
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)  # how it is used
     right: Path | None = None  # folder of right images, as `RightImages` says
+    camera: str | None = None  # whose frames are taken; else those of a log's only one with disparity
     device: str = "auto"  # of networks and grids
     threads: int | None = None  # of torch, OpenCV and ONNX Runtime; None leaves them what they are
     processor_time: bool = False  # whether that is counted, which other work on the machine does not change
@@ -77,22 +78,22 @@ def build_chain(logs: Sequence[Path], parts: Parts) -> Built:
     device = choose_device(parts.device)
     if parts.processor_time and (device.type != "cpu" or parts.threads != 1):
         raise ConfigError("is what a chain takes on one thread of a CPU alone: add --threads 1", field="processor_time")
-    made = models_for(parts.models, logs[0], device)
+    made = models_for(parts.models, logs[0], device, parts.camera)
     segmentation = None
     if parts.segment is not None:
         segmentation = SegmentationNetwork(
             parts.segment, parts.segmentation, device=parts.device, threads=parts.threads
         )
-    chain = Chain({each.name: each.model for each in made}, device, segmentation, parts.right)
+    chain = Chain({each.name: each.model for each in made}, device, segmentation, parts.right, parts.camera)
     return Built(chain, tuple(each.name for each in made if each.is_random))
 
 
-def models_for(names: Sequence[str], log: Path, device: torch.device) -> list[TimedModel]:
+def models_for(names: Sequence[str], log: Path, device: torch.device, camera: str | None = None) -> list[TimedModel]:
     """Make models; what has to learn something learns it from one log."""
 
     @cache
     def windows() -> WindowSet:
-        data = stack_recordings(build_log(log, GRID), cell_m=GRID.spec.cell_m)
+        data = stack_recordings(build_log(log, grid_of(camera)), cell_m=GRID.spec.cell_m)
         return select_windows(data, training_windows(data.frame_counts, WINDOW).windows, sensors=GIVEN.sensors)
 
     return [timed_model(name, GIVEN, device, windows) for name in dict.fromkeys(names)]

@@ -24,7 +24,7 @@ from semgrid_eval.recording.disparity import coded_disparity
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.recording.types import CameraFrame
 from semgrid_eval.segmentation.network import SegmentationNetwork
-from semgrid_eval.sensors.camera import CameraSensor, require_disparity
+from semgrid_eval.sensors.camera import CameraSensor, stereo_camera
 from semgrid_eval.sensors.projection import Projection
 from semgrid_eval.sensors.sensor import Points
 from semgrid_eval.sources.matching import SemiGlobalMatching
@@ -35,8 +35,15 @@ from semgrid_eval.windows.grids import shift_grids, shift_in_cells
 from semgrid_eval.windows.plan import WindowConfig
 
 _NAME, _SENSOR = "full", CameraSensor()
-GRID = GridConfig(sensors={_NAME: _SENSOR}, target=(_NAME,))
-"""What the chain makes of a frame: the whole image, on the paper's grid."""
+
+
+def grid_of(camera: str | None) -> GridConfig:
+    """Say what the chain makes of a frame: the whole image of a camera, of a log's only one unless named, as a grid."""
+    return GridConfig(sensors={_NAME: CameraSensor(camera=camera)}, target=(_NAME,))
+
+
+GRID = grid_of(None)
+"""The paper's grid."""
 WINDOW = WindowConfig()
 """Which grids models see, and how far ahead they predict."""
 GIVEN = Given((_NAME,), WINDOW.inputs, GRID.spec.rows, GRID.spec.columns, GRID.spec.cell_m, translate=True)
@@ -52,6 +59,7 @@ class Chain:
     device: torch.device  # where grids are aligned and models run
     segmentation: SegmentationNetwork | None = None  # makes the labels; else those of the log are taken
     right: Path | None = None  # of right images, for matching, which then makes the disparity; else that of the log
+    camera: str | None = None  # whose frames are taken; else those of a log's only one with disparity
 
 
 class _Pictures(NamedTuple):
@@ -76,8 +84,8 @@ class LiveLog:
 
     def __init__(self, log: LogReader, chain: Chain) -> None:
         self._log, self._chain = log, chain
-        self.camera = log.choose_camera(_SENSOR.camera)
-        calibration = require_disparity(log, self.camera)
+        self.camera = stereo_camera(log, chain.camera)
+        calibration = log.calibration(self.camera)
         self._projection = Projection(calibration, _SENSOR.image_size_px, GRID.class_by_label())
         self._matching = SemiGlobalMatching(calibration)
         self._right = RightImages(chain.right, log, self.camera) if chain.right else None

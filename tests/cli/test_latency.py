@@ -74,6 +74,7 @@ def test_a_table_shows_stages_models_and_chains_with_their_shares():
         (["--warm-up", "99"], "Error: --warm-up: 99 leaves no frame to measure"),
         (["--device", "tpu"], "Error: --device: there is no device 'tpu' on this machine"),
         (["--right", "nothing"], "Error: nothing/toy: is not a folder"),
+        (["--camera", "left"], "Error: logs/val/toy.mcap: camera: 'left' is not front, the only choice"),
     ],
 )
 def test_faults_are_one_line_and_leave_no_profile(logs, capsys, arguments, fault):

@@ -64,8 +64,8 @@ def test_failed_log_gives_exit_code_1(place, capsys):
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        (("--std", 1, 0, 1), "Error: std.1: must be above 0, not 0.0\n"),
-        (("--size", 0, 8), "Error: size.0: must be at least 1, not 0\n"),
+        (("--std", 1, 0, 1), "Error: --std: must be above 0, not 0.0\n"),
+        (("--size", 0, 8), "Error: --size: must be at least 1, not 0\n"),
         (("--classes", "citscapes"), "Error: --classes: 'citscapes' is neither a file nor one of cityscapes, "),
         (("--device", "gpu"), "Error: --device: there is no device 'gpu' for ONNX Runtime; use auto, cpu or cuda\n"),
         (("--device", "cuda"), "Error: --device: this ONNX Runtime cannot use 'cuda'; install onnxruntime-gpu "),

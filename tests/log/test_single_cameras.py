@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import cv2
+import numpy as np
 import pytest
 from support.driving import CALIBRATION, FRAME_NS, START_NS, driving
 from support.independent_reader import of_topic, read, reader_script, sha256
@@ -73,6 +75,23 @@ def test_labels_alone_are_enough_and_tell_the_size(tmp_path):
     with LogReader(tmp_path / "log.mcap") as log:
         assert log.image_size("rear") == (64, 32)
         assert all(each.label_png for each in log.frames("rear"))
+
+
+def test_labels_that_are_smaller_than_images_do_not_tell_what_a_camera_is_calibrated_for(tmp_path):
+    small = cv2.imencode(".png", np.zeros((16, 32), np.uint8))[1].tobytes()
+
+    def write(at, **changes):
+        def change(frame):
+            frame = replace(frame, label_png=small)
+            return replace(frame, **changes) if frame.stamp_ns == START_NS + at * FRAME_NS else frame
+
+        write_log(changed(single(full(), "rear"), change), tmp_path / "log.mcap")
+
+    write(2, image_file=None)
+    with LogReader(tmp_path / "log.mcap") as log:
+        assert log.image_size("rear") == (64, 32)
+    with pytest.raises(InputError, match=r"/camera/rear/image at \d+ ns: is 64 x 32; pictures before it are 32 x 16"):
+        write(0, image_file=None)
 
 
 def test_written_again_it_is_the_same_bytes(path, tmp_path):

@@ -9,6 +9,7 @@ import pytest
 import torch
 from support.coloured import TRAIN_COLOURS
 from support.onnx_models import FLAT, colour_network
+from support.single import single
 from support.toy_world import png, street
 
 from semgrid_eval.errors import InputError, LogError
@@ -158,6 +159,30 @@ def test_logs_without_what_the_chain_needs_are_named(tmp_path):
         watched(path)
     write_log(replace(plain, moments=lambda: (replace(each, motion=()) for each in plain.moments())), path)
     with pytest.raises(LogError, match=rf"{path}: has no motion samples"):
+        watched(path)
+
+
+def test_the_camera_with_disparity_is_taken_and_named_where_there_are_several(tmp_path):
+    street_alone = street(1, frames=FRAMES).recording("toy")
+    two = dict.fromkeys(("front", "rear"), street_alone.calibrations["front"])
+
+    def doubled():
+        for moment in street_alone.moments():
+            yield replace(moment, cameras=dict.fromkeys(two, moment.cameras["front"]))
+
+    path = tmp_path / "toy.mcap"
+    both = replace(street_alone, calibrations=two, moments=doubled)
+    write_log(both, path)
+    with pytest.raises(LogError, match="there are several, name one: front, rear"):
+        watched(path)
+    assert len(watched(path, camera="rear")[0]) == WHOLE
+    assert [each.name for each in models_for(("table",), path, CPU, "rear")] == ["table"]
+    write_log(single(both, "rear"), path)
+    assert len(watched(path)[0]) == WHOLE
+    with pytest.raises(LogError, match="camera rear: has no disparity"):
+        watched(path, camera="rear")
+    write_log(single(single(both, "rear"), "front"), path)
+    with pytest.raises(LogError, match=r"camera front, rear: have no disparity.*\{camera: \[front, rear\]\}"):
         watched(path)
 
 
