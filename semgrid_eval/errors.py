@@ -34,6 +34,10 @@ class LogError(InputError):
     """An MCAP log is damaged, incomplete or lacks what is needed."""
 
 
+class AbsentSensorError(LogError):
+    """An MCAP log, however sound, does not have the sensor that is asked of it."""
+
+
 class UnknownTruthError(LogError):
     """An MCAP log does not hold the truth that was asked for: recordings of real sensors never do."""
 

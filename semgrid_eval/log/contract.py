@@ -1,5 +1,6 @@
 """Contracts: what is expected of a recording, its topics, rates, gaps, latencies and values."""
 
+import re
 from pathlib import Path
 from typing import Literal, NamedTuple, Self
 
@@ -7,11 +8,12 @@ import yaml
 from pydantic import Field, field_validator, model_validator
 
 from semgrid_eval.config import Config, load_yaml, parse_config
-from semgrid_eval.faults import unknown_key
+from semgrid_eval.faults import not_one_of, unknown_key
 from semgrid_eval.log.findings import Severity
 from semgrid_eval.log.quantities import quantities_of
 
 CAMERA, STEREO, SINGLE = "{camera}", "{stereo}", "{single}"
+PLACES = (CAMERA, STEREO, SINGLE)
 """Stand in the name of a topic for every camera of a log, every one with disparity, and every one without."""
 Clock = Literal["log", "publish", "stamp"]
 _HEADER = """\
@@ -112,6 +114,8 @@ class Contract(Config):
     @classmethod
     def _measures(cls, value: dict[str, TopicContract]) -> dict[str, TopicContract]:
         for topic, expected in value.items():
+            if strange := [place for place in re.findall(r"\{.*?\}", topic) if place not in PLACES]:
+                raise ValueError(f"{topic}: {not_one_of(strange[0], PLACES)}")
             allowed = quantities_of(topic)
             if unknown := [name for name in expected.values if name not in allowed]:
                 raise ValueError(f"{topic}.values.{unknown[0]}: {unknown_key(unknown[0], allowed)}")
@@ -147,6 +151,6 @@ def topics_of(name: str, cameras: Cameras) -> dict[str, str]:
 
 def topic_beside(name: str, camera: str) -> str:
     """Return the topic that a name stands for beside a topic of a camera."""
-    for place in (CAMERA, STEREO, SINGLE):
+    for place in PLACES:
         name = name.replace(place, camera)
     return name

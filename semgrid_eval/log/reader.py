@@ -7,7 +7,7 @@ from itertools import groupby, product
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from semgrid_eval.errors import InputError, LogError
+from semgrid_eval.errors import AbsentSensorError, InputError, LogError
 from semgrid_eval.faults import not_one_of
 from semgrid_eval.log import calibrations, codec, recovered, topics
 from semgrid_eval.log.codec import CONDITIONS_RECORD, PLAYBACK_RECORD, PREDICTIONS_RECORD, RECORD, Scene
@@ -102,7 +102,7 @@ class LogReader(Container):
         """Return the camera that is wanted, or the log's only one where none is.
 
         Raises:
-            LogError: there is no such camera, or there are several and none is wanted.
+            AbsentSensorError: there is no such camera, or there are several and none is wanted.
         """
         return self._choose(wanted, self.scene.cameras, "camera")
 
@@ -110,7 +110,7 @@ class LogReader(Container):
         """Return the LiDAR that is wanted, or the log's only one where none is.
 
         Raises:
-            LogError: there is no such LiDAR, or there are several and none is wanted.
+            AbsentSensorError: there is no such LiDAR, or there are several and none is wanted.
         """
         return self._choose(wanted, self.lidars, "lidar")
 
@@ -262,7 +262,7 @@ class LogReader(Container):
         if chosen in there:
             return chosen
         fault = f"there are several, name one: {', '.join(there)}" if chosen is None else not_one_of(chosen, there)
-        raise LogError(fault if there else "the log has none", path=self.path, field=what)
+        raise AbsentSensorError(fault if there else "the log has none", path=self.path, field=what)
 
     def _require_types(self, wanted: Iterable[str]) -> None:
         wrong = self.wrong_types()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from semgrid_eval.errors import LogError, located
+from semgrid_eval.errors import AbsentSensorError, LogError, located
 from semgrid_eval.log.topics import DISPARITY, LABEL, camera_topic
 from semgrid_eval.sensors.sensor import Points, SensorConfig
 
@@ -83,7 +83,7 @@ def camera_frames(log: "LogReader", sensor: CameraSensor) -> str:
     """Return the topic of what every frame of a sensor's camera has.
 
     Raises:
-        LogError: as `stereo_camera` says.
+        AbsentSensorError: as `stereo_camera` says.
     """
     return camera_topic(stereo_camera(log, sensor.camera), DISPARITY)
 
@@ -92,12 +92,12 @@ def stereo_camera(log: "LogReader", wanted: str | None) -> str:
     """Return the camera that is wanted, or the log's only one with disparity where none is.
 
     Raises:
-        LogError: there is no such camera, it has no disparity, or none is wanted and several have it, or none has.
+        AbsentSensorError: there is no such camera, it has no disparity, or none is wanted and not just one has it.
     """
     cameras = log.scene.cameras if wanted is None else (log.choose_camera(wanted),)
     stereo = [camera for camera in cameras if not log.is_single(camera)]
     if cameras and not stereo:
-        raise LogError(_without_disparity(cameras), path=log.path, field=f"camera {', '.join(cameras)}")
+        raise AbsentSensorError(_without_disparity(cameras), path=log.path, field=f"camera {', '.join(cameras)}")
     return stereo[0] if len(stereo) == 1 else log.choose_camera(wanted)
 
 

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, SerializeAsAny, StringConstraints
 
 from semgrid_eval.classes import NO_POINT
 from semgrid_eval.config import of_kind
-from semgrid_eval.errors import LogError
+from semgrid_eval.errors import AbsentSensorError
 from semgrid_eval.log.topics import TRUE_ACTORS
 from semgrid_eval.sensors.camera import CameraSensor, camera_frames, read_cameras
 from semgrid_eval.sensors.lidar import LidarSensor, lidar_sweeps, read_lidars
@@ -68,12 +68,16 @@ def times_of(log: "LogReader", sensor: SensorConfig) -> Iterator[int]:
 
 
 def misfit(log: "LogReader", sensors: Iterable[SensorConfig]) -> str | None:
-    """Say why a log cannot have what sensors look at, before anything is looked at; None where it may."""
+    """Say why a log cannot have what sensors look at, before anything is looked at; None where it may.
+
+    Raises:
+        LogError: the log is damaged.
+    """
     try:
         for sensor in sensors:
             if (topic := KINDS[sensor.kind].topic) is not None:
                 topic(log, sensor)
-    except LogError as error:
+    except AbsentSensorError as error:
         return str(error)
     return None
 

@@ -68,7 +68,7 @@ def read_lidars(
 
 
 def lidar_sweeps(log: "LogReader", sensor: LidarSensor) -> str:
-    """Return the topic of a sensor's sweeps; a LogError says that there is no such LiDAR, or no camera to colour it."""
+    """Return the topic of a sensor's sweeps; an AbsentSensorError says that it, or its camera, is not there."""
     for camera in sensor.colour_from.cameras if sensor.colour_from else ():
         log.choose_camera(camera)
     return lidar_topic(log.choose_lidar(sensor.lidar))

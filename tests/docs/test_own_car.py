@@ -36,7 +36,8 @@ def workplace(tmp_path, monkeypatch):
     write_bag(tmp_path / "drive", with_lidar(street(1, frames=16, noise_px=0.05)))
     toy_labeller(tmp_path / "network.onnx")
     (tmp_path / "m.yaml").write_text(YAML[2])
-    (tmp_path / "both.yaml").write_text(YAML[3])
+    (tmp_path / "single.yaml").write_text(YAML[3])
+    (tmp_path / "both.yaml").write_text(YAML[4])
     return tmp_path
 
 
@@ -74,6 +75,8 @@ def test_every_command_of_the_page_runs_in_its_order(workplace):
         "segment",
         "run",
         "report",
+        "run",
+        "report",
         "grids",
     ]
     said = [run(line) for line in COMMANDS]
@@ -85,14 +88,15 @@ def test_every_command_of_the_page_runs_in_its_order(workplace):
     (log,) = find_logs(workplace / "labelled")
     with LogReader(log) as reader:
         assert all(frame.label_png for frame in reader.frames("front"))
-    assert all(row.results for row in read_run(workplace / "runs/drive").rows)
-    assert (workplace / "runs/drive/report/index.html").is_file()
+    for name in ("drive", "points"):
+        assert all(row.results for row in read_run(workplace / "runs" / name).rows)
+        assert (workplace / "runs" / name / "report" / "index.html").is_file()
     assert len(list((workplace / "grids").glob("*.npz"))) == 1
     assert_points_are_coloured(log)
 
 
 def assert_points_are_coloured(log):
-    (grids,) = build_log(log, parse_config(GridConfig, yaml.safe_load(YAML[3])))
+    (grids,) = build_log(log, parse_config(GridConfig, yaml.safe_load(YAML[4])))
     assert grids.sensors == ("front", "top", "front+top")
     assert (grids.grids[1] != UNKNOWN).any(axis=(1, 2)).all()
 

@@ -80,3 +80,14 @@ def test_a_camera_without_disparity_is_told_with_what_it_can_do_before_anything_
         assert misfit(log, [both["a"]]) is None
         coloured = LidarSensor(colour_from=ColourFrom(camera="left"))
         assert misfit(log, [coloured]).endswith("lidar: the log has none")
+
+
+def test_a_damaged_calibration_is_the_logs_fault_and_no_misfit(tmp_path, monkeypatch):
+    write_log(street(1, frames=1).recording(), tmp_path / "log.mcap")
+
+    def damaged(log, camera):
+        raise LogError("is damaged", path=log.path)
+
+    monkeypatch.setattr(LogReader, "calibration", damaged)
+    with LogReader(tmp_path / "log.mcap") as log, pytest.raises(LogError, match=r"log\.mcap: is damaged"):
+        misfit(log, [CameraSensor()])

@@ -31,6 +31,7 @@ topics: {/a: {uncovered_s: {topic: /b}}}
 topics: {/ego/motion: {values: {sped: {low: 1}}}}
 topics: {/ego/motion: {values: {speed_mps: 3}}}
 topics: {/other: {values: {speed_mps: {low: 1}}}}
+topics: {"/camera/{mono}/image": {messages: {low: 1}}}
 latencies: {topic: /a}
 latencies: [{topic: /a}]
 latencies: [{seconds: {high: 1}}]
