@@ -80,7 +80,8 @@ class CameraColouring:
         label = self._label_image(frame)
         pixels = PointPixels.of(self._projected(frame, stamp_ns, place_m), label.shape)
         seen = pixels.inside.copy()
-        seen[pixels.inside] = ~pixels.hidden(label.shape, self._reach_px(label.shape))
+        beside_px = reach_px(self._settings.occlusion_rad, self._calibration, self._size_px, label.shape)
+        seen[pixels.inside] = ~pixels.hidden(label.shape, beside_px)
         found = np.zeros(len(place_m), np.uint8)
         found[pixels.inside] = label[pixels.row, pixels.column]
         return Coloured(found, seen)
@@ -109,9 +110,6 @@ class CameraColouring:
         moved_m = now.seen_from(then).apply(place_m[:, :2])
         points = np.column_stack([moved_m, place_m[:, 2], np.ones(len(place_m))])
         return np.asarray(self._projection @ points.T, np.float64)
-
-    def _reach_px(self, shape: tuple[int, ...]) -> tuple[int, int]:
-        return reach_px(self._settings.occlusion_rad, self._calibration, self._size_px, shape)
 
 
 def reach_px(
