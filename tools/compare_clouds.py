@@ -49,7 +49,7 @@ LIDAR = GridConfig(sensors={"top": LidarSensor()}, target=("top",))
 SENSORS: dict[str, SensorConfig] = {
     "own": LidarSensor(),
     "coloured": LidarSensor(colour_from=ColourFrom()),
-    "unhidden": LidarSensor(colour_from=ColourFrom(occlusion_px=0)),
+    "unhidden": LidarSensor(colour_from=ColourFrom(occlusion_rad=0.0)),
     "camera": CameraSensor(),
 }
 Cells = NDArray[np.uint8]
@@ -133,7 +133,7 @@ def _print_colours(recordings: list[Recording], out: Path) -> None:
         hidden = [_share(each, camera, ahead) for each in (coloured, unhidden)]
         known = [f"{100 * (each > 0).sum() / (own > 0).sum():.0f} %" for each in (coloured, unhidden)]
         shares.append(f"{log.stem}: cells known of those of own labels {known}, equal to the camera's {hidden}")
-    print("\n".join(["", "With `occlusion_px: 4` and with 0:", *shares]))
+    print("\n".join(["", "By default and with `occlusion_rad: 0`:", *shares]))
 
 
 def _grids(log: Path, config: GridConfig) -> Cells:

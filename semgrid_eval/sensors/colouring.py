@@ -16,7 +16,7 @@ from semgrid_eval.sensors.projection import unit_projection
 
 if TYPE_CHECKING:
     from semgrid_eval.log.reader import LogReader
-    from semgrid_eval.recording.types import CameraFrame
+    from semgrid_eval.recording.types import CameraCalibration, CameraFrame
     from semgrid_eval.sensors.lidar import ColourFrom
 
 _BEHIND = 0.15
@@ -66,7 +66,8 @@ class CameraColouring:
     def __init__(self, log: "LogReader", camera: str | None, settings: "ColourFrom", motion: EgoMotion) -> None:
         self._path, self._settings = log.path, settings
         self._camera = log.choose_camera(camera)
-        self._projection = unit_projection(log.calibration(self._camera), log.image_size(self._camera))
+        self._calibration, self._size_px = log.calibration(self._camera), log.image_size(self._camera)
+        self._projection = unit_projection(self._calibration, self._size_px)
         self._motion = motion
         self._frames = log.frames(self._camera)
         self._nearest, self._next = next(self._frames, None), next(self._frames, None)
@@ -77,9 +78,10 @@ class CameraColouring:
         if frame is None:
             return Coloured(np.zeros(len(place_m), np.uint8), np.zeros(len(place_m), np.bool_))
         label = self._label_image(frame)
-        pixels = _Pixels.of(self._projected(frame, stamp_ns, place_m), label.shape)
+        pixels = PointPixels.of(self._projected(frame, stamp_ns, place_m), label.shape)
         seen = pixels.inside.copy()
-        seen[pixels.inside] = ~pixels.hidden(label.shape, self._settings.occlusion_px)
+        beside_px = reach_px(self._settings.occlusion_rad, self._calibration, self._size_px, label.shape)
+        seen[pixels.inside] = ~pixels.hidden(label.shape, beside_px)
         found = np.zeros(len(place_m), np.uint8)
         found[pixels.inside] = label[pixels.row, pixels.column]
         return Coloured(found, seen)
@@ -110,8 +112,20 @@ class CameraColouring:
         return np.asarray(self._projection @ points.T, np.float64)
 
 
+def reach_px(
+    angle_rad: float, calibration: "CameraCalibration", size_px: tuple[int, int], shape: tuple[int, ...]
+) -> tuple[int, int]:
+    """Return how many rows and columns of an image (H, W) an angle spans in its middle, at most all of them.
+
+    `size_px` are width and height of the source image, for which the camera is calibrated.
+    """
+    width, height = size_px
+    rows, columns = angle_rad * calibration.fy_px / height, angle_rad * calibration.fx_px / width
+    return round(min(rows, 1.0) * shape[0]), round(min(columns, 1.0) * shape[1])
+
+
 @dataclass(frozen=True)
-class _Pixels:
+class PointPixels:
     """Where points are in an image: which are inside (N,), and of these (M,) the pixel and the depth."""
 
     inside: Flags
@@ -120,7 +134,7 @@ class _Pixels:
     depth_m: NDArray[np.float32]
 
     @classmethod
-    def of(cls, projected: Floats, shape: tuple[int, ...]) -> "_Pixels":
+    def of(cls, projected: Floats, shape: tuple[int, ...]) -> "PointPixels":
         """Find the pixels of points (3, N), as `unit_projection` gives them, in an image (H, W)."""
         depth_m = projected[2]
         inside = depth_m > 0
@@ -130,12 +144,13 @@ class _Pixels:
         row, column = row[inside].astype(np.intp), column[inside].astype(np.intp)
         return cls(inside, row, column, depth_m[inside].astype(np.float32))
 
-    def hidden(self, shape: tuple[int, ...], reach_px: int) -> Flags:
+    def hidden(self, shape: tuple[int, ...], reach_px: tuple[int, int]) -> Flags:
         """Tell which points (M,) have a much nearer one at most `reach_px` rows and columns away.
 
         A LiDAR above the camera sees over what the camera sees; there the pixel shows what stands before.
         """
         nearest_m = np.full(shape, np.inf, np.float32)
         np.minimum.at(nearest_m, (self.row, self.column), self.depth_m)
-        nearest_m = np.asarray(cv2.erode(nearest_m, np.ones((2 * reach_px + 1,) * 2, np.uint8)), np.float32)
+        beside = np.ones((2 * reach_px[0] + 1, 2 * reach_px[1] + 1), np.uint8)
+        nearest_m = np.asarray(cv2.erode(nearest_m, beside), np.float32)
         return np.asarray(nearest_m[self.row, self.column] < (1 - _BEHIND) * self.depth_m)

@@ -26,7 +26,8 @@ class ColourFrom(Config):
     # Its name in the log, or names: a point has the label of the first that sees it. None takes a log's only one.
     camera: str | tuple[str, ...] | None = None
     within_s: float = Field(0.1, ge=0.0, le=1.0)  # of a sweep, before or after it: the nearest label image in that time
-    occlusion_px: int = Field(4, ge=0, le=64)  # how far beside a point, in pixels of the label image, another hides it
+    # How far beside a point a nearer one hides it, in the middle of the image: more than half the angle between rings.
+    occlusion_rad: float = Field(0.0057, ge=0.0, le=0.05)
 
     @field_validator("camera", mode="before")
     @classmethod

@@ -84,8 +84,8 @@ def test_other_settings_of_the_page_are_valid():
     others = [yaml.safe_load(each)["grid"] for each in blocks("yaml", PAGE) if "\nrows:" not in each]
     both, coloured, ring = (parse_config(GridConfig, each) for each in others)
     assert both.target_row == "top+left"
-    assert coloured.sensors["top"].colour_from == ColourFrom(camera="left", within_s=0.1, occlusion_px=4)
-    assert ring.sensors["top"].colour_from.cameras == RING_CAMERAS
+    assert coloured.sensors["top"].colour_from == ColourFrom(camera="left", within_s=0.1, occlusion_rad=0.0057)
+    assert ring.sensors["top"].colour_from == ColourFrom(camera=RING_CAMERAS, occlusion_rad=0.01)
 
 
 @pytest.mark.parametrize(

@@ -22,13 +22,14 @@ from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
 from semgrid_eval.recording.lidar import Mount
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment, MotionSample
+from semgrid_eval.sensors.colouring import reach_px
 from semgrid_eval.sensors.lidar import ColourFrom, LidarSensor, read_lidars
 
 WIDTH, HEIGHT = 400, 200
 CAMERA = CameraCalibration(100.0, 100.0, 200.0, 100.0, 0.5, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
 MOUNT = Mount((0.0, 0.0, 2.0), (0.0, 0.0, 0.0, 1.0))
 MS = 1_000_000
-CAR, POLE, ROAD = (CLASS_NAMES.index(name) for name in ("car", "pole_sign", "road"))
+BUILDING, CAR, POLE, ROAD = (CLASS_NAMES.index(name) for name in ("building", "car", "pole_sign", "road"))
 
 
 def label_image(fill="sky", shape=(HEIGHT, WIDTH), **places):
@@ -44,7 +45,7 @@ def frame(after_ms, label):
     return CameraFrame(START_NS + after_ms * MS, None, png(disparity), None if label is None else png(label))
 
 
-def classes(tmp_path, points, images, *, at_ms=0, speed=0.0, yaw_rate=0.0, **settings):
+def classes(tmp_path, points, images, *, calibration=CAMERA, at_ms=0, speed=0.0, yaw_rate=0.0, **settings):
     """Classes of points, given in the LiDAR's axes in the place of the camera, at one sweep beside label images."""
     times = {ms: frame(ms, image) for ms, image in images.items()}
 
@@ -56,7 +57,7 @@ def classes(tmp_path, points, images, *, at_ms=0, speed=0.0, yaw_rate=0.0, **set
             yield Moment(stamp_ns, cameras, (MotionSample(stamp_ns, speed, yaw_rate),), sweeps=sweeps)
 
     recording = recorded(moments)
-    recording.calibrations["front"] = CAMERA
+    recording.calibrations["front"] = calibration
     write_log(recording, tmp_path / "log.mcap")
     sensor = LidarSensor(colour_from=ColourFrom(**settings))
     with LogReader(tmp_path / "log.mcap") as log:
@@ -124,10 +125,48 @@ def test_what_stands_behind_something_nearer_gives_nothing(tmp_path):
     """A LiDAR sees over a car 10 m ahead; 40 m ahead, three rows below its roof, the pixel shows the car."""
     image = label_image("road", car=np.s_[105:125, 150:250])
     roof, ground = (10, 0, -0.5), (40, 0.4, -3.2)  # rows 105 and 108, columns 200 and 199
-    assert classes(tmp_path, [roof, ground], {0: image}) == [CAR, NO_POINT]
-    assert classes(tmp_path, [roof, ground], {0: image}, occlusion_px=3) == [CAR, NO_POINT]
-    assert classes(tmp_path, [roof, ground], {0: image}, occlusion_px=2) == [CAR, CAR]
-    assert classes(tmp_path, [ground], {0: image}) == [CAR]
+    assert classes(tmp_path, [roof, ground], {0: image}, occlusion_rad=0.03) == [CAR, NO_POINT]
+    assert classes(tmp_path, [roof, ground], {0: image}, occlusion_rad=0.02) == [CAR, CAR]
+    assert classes(tmp_path, [ground], {0: image}, occlusion_rad=0.03) == [CAR]
+
+
+@pytest.mark.parametrize(
+    ("across", "down", "expected"), [(6, 0, NO_POINT), (7, 0, CAR), (0, 3, NO_POINT), (0, 4, CAR), (6, 3, NO_POINT)]
+)
+def test_what_hides_reaches_as_far_as_the_focal_lengths_say(tmp_path, across, down, expected):
+    """0.03 rad are 6 columns of 200 px of focal length, and 3 rows of 100."""
+    far, near = (20, 0, 0), (10, 10 * across / 200, 10 * down / 100)
+    camera = replace(CAMERA, fx_px=200.0)
+    found = classes(tmp_path, [far, near], {0: label_image("car")}, calibration=camera, occlusion_rad=0.03)
+    assert found == [expected, CAR]
+
+
+@pytest.mark.parametrize("scale", [0.25, 1, 4])
+def test_a_car_hides_the_wall_behind_it_in_images_of_any_size(tmp_path, scale):
+    """64 rings, 0.0075 rad apart, of points 0.0035 rad apart, are 13 rows and 6 columns apart at 1,700 px.
+
+    The wall is seen in the middle between the points of a car on the left, and beside it on the right.
+    """
+    rings, azimuths = 0.0075 * np.arange(-6, 7), 0.0035 * np.arange(2, 20)
+    car = [(10, 10 * across, 10 * up) for up in rings for across in azimuths]
+    behind = [(40, 40 * across, 40 * up) for up in rings[:-1] + 0.00375 for across in azimuths[:-1] + 0.00175]
+    beside = [(40, -40 * across, 40 * up) for up in rings for across in azimuths]
+    shape = (round(HEIGHT * scale), round(WIDTH * scale))
+    image = label_image("building", shape, car=np.s_[:, : shape[1] // 2])
+    camera = replace(CAMERA, fx_px=1700.0, fy_px=1700.0)
+    expected = [CAR] * len(car) + [NO_POINT] * len(behind) + [BUILDING] * len(beside)
+    assert classes(tmp_path, [*car, *behind, *beside], {0: image}, calibration=camera) == expected
+
+
+@pytest.mark.parametrize(("focal_px", "size_px"), [(707.0912, (1226, 370)), (718.856, (1241, 376))])
+def test_by_default_what_hides_reaches_4_px_in_images_of_kitti(focal_px, size_px):
+    camera = replace(CAMERA, fx_px=focal_px, fy_px=focal_px)
+    assert reach_px(ColourFrom().occlusion_rad, camera, size_px, size_px[::-1]) == (4, 4)
+
+
+def test_what_hides_never_reaches_farther_than_the_image():
+    camera = replace(CAMERA, fx_px=1e300, fy_px=1e300)
+    assert reach_px(0.05, camera, (WIDTH, HEIGHT), (50, 100)) == (50, 100)
 
 
 @pytest.mark.parametrize(("nearer_m", "expected"), [(8.4, NO_POINT), (8.6, CAR), (10.0, CAR)])

@@ -136,6 +136,7 @@ GRIDS = Kind(
         _grid("a second camera to colour points, absent", "single", "{kind: lidar, colour_from: {camera: [left, up]}}"),
         _grid("colour_from is a name", "unlabelled", "{kind: lidar, colour_from: front}"),
         _grid("colours of a time too long ago", "unlabelled", "{kind: lidar, colour_from: {within_s: 5}}"),
+        _grid("points hidden far aside of another", "unlabelled", "{kind: lidar, colour_from: {occlusion_rad: 4}}"),
     ),
 )
 KINDS = (DRIVES, GRIDS)
