@@ -13,6 +13,7 @@ from semgrid_eval.sources.ros2.inspection import inspect_bags
 from semgrid_eval.sources.ros2.mapping import BagMap, load_map
 from semgrid_eval.sources.ros2.options import Ros2Options
 from semgrid_eval.sources.ros2.plan import BagPlan, Cut, plan_bag, told
+from semgrid_eval.sources.ros2.recording import Stretch
 from semgrid_eval.words import plural
 
 _TOLD_AT_M = 50.0
@@ -69,6 +70,7 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
     if mapping.single:
         worth = "labels of theirs can colour the points of a LiDAR: `colour_from` of the sensor"
         parts.append(f"nothing tells the depth of {', '.join(sorted(mapping.single))}; {worth}")
+    parts += _absences([each for plan in plans for each in plan.stretches], mapping)
     unlabelled = [name for name, camera in mapping.cameras.items() if camera.labels is None]
     if unlabelled:
         parts.append(f"no labels for {', '.join(unlabelled)}: {how_to_label(out)}")
@@ -76,6 +78,13 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
         advice = "a grid needs `label_field` in the map, or a camera to colour them: `colour_from` of the sensor"
         parts.append(f"points of {', '.join(bare)} have no labels: {advice}")
     return "; ".join(parts)
+
+
+def _absences(recordings: Sequence[Stretch], mapping: BagMap) -> list[str]:
+    """Say for each camera how many recordings are without it."""
+    counts = {name: sum(name not in each.rigs for each in recordings) for name in mapping.cameras}
+    total = plural(len(recordings), "recording")
+    return [f"{name} has no frame in {count} of {total}" for name, count in counts.items() if count]
 
 
 def _codings(plan: BagPlan) -> list[str]:
