@@ -173,9 +173,9 @@ class _Finder:
         return (shape is not None and shape.coding in _DEPTH_CODINGS) or _has_word(name, _DEPTH_WORDS)
 
     def _borrows(self, camera: CameraSeen, cameras: Sequence[CameraSeen]) -> bool:
-        """Tell whether a camera has got a CameraInfo of its size that is another one's."""
+        """Tell whether a camera has got a CameraInfo of its size that is another one's: of another place and frame."""
         shared = any(each.info == camera.info for each in cameras if each is not camera)
-        is_beside = camera.main.startswith(f"{_namespace(camera.info)}/")
+        is_beside = _namespace(camera.main) == _namespace(camera.info)
         is_framed = camera.info != "" and self._topics[camera.info].frame == self._topics[camera.main].frame
         return camera.is_single and shared and not (is_beside or is_framed)
 

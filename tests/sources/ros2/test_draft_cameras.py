@@ -160,19 +160,52 @@ def test_a_camera_without_calibration_is_left_out_and_the_others_stay(tmp_path):
 def test_a_camera_without_depth_is_drafted_with_what_it_is_good_for_beside_others_and_alone(tmp_path):
     rear = [
         info("/rear/info"),
-        image("/rear/image", "rear"),
+        image("/rear/image", optical("rear")),
         sent("/tf_static", camera_link("rear", ONE.calibration())),
     ]
-    told = "    # Nothing in the bag tells its depth (disparity, depth, or a right image whose CameraInfo has"
+    told = (
+        "    # Nothing in the bag tells its depth (disparity, depth, or a right image whose CameraInfo has the baseline"
+        " in P):\n"
+        "    # no grids of its own, but its labels colour a LiDAR's points (colour_from of the sensor), and reports"
+        " show it.\n"
+    )
     alone, beside = tmp_path / "alone", tmp_path / "beside"
     for here, others in ((alone, [motion()]), (beside, [*rig(front=Mount()), image("/side/image", "side")])):
         here.mkdir()
         text = drafted(here, [*others, *rear])
         assert told in text
+        assert "\\n" not in text
     assert cameras(text)["rear"] == {"info": "/rear/info", "image": "/rear/image"}
     assert text.count(told) == 1
     ended = run_command(f"convert ros2 {beside}/drive {beside}/logs --map {beside}/map.yaml --workers 1".split())
-    assert "Error: " in ended.err, "a single frame is no recording"
+    assert ended.code == 0, ended.err
+
+
+def with_frame(message, frame):
+    return message._replace(message=replace(message.message, header=ros.header(START_NS, frame)))
+
+
+@pytest.mark.parametrize("root", ["", "/sensing"])
+@pytest.mark.parametrize("frame", ["cam", "nobody"])
+def test_no_camera_gets_the_calibration_of_one_above_it(tmp_path, root, frame):
+    text = drafted(
+        tmp_path,
+        [
+            motion(),
+            with_frame(info(f"{root}/camera_info"), frame),
+            image(f"{root}/image_raw", "cam"),
+            image(f"{root}/rear/image_raw", "rear"),
+        ],
+    )
+    assert cameras(text) == {"front": {"info": f"{root}/camera_info", "image": f"{root}/image_raw"}}
+    assert f"# {root}/rear/image_raw: no CameraInfo of its own is in the bag: left out.\n" in text
+
+
+def test_a_calibration_above_two_cameras_is_that_of_its_frame(tmp_path):
+    images = [image(f"/{name}/image_raw", name) for name in ("ahead", "rear")]
+    text = drafted(tmp_path, [motion(), with_frame(info("/camera_info"), "rear"), *images])
+    assert cameras(text) == {"front": {"info": "/camera_info", "image": "/rear/image_raw"}}
+    assert "# /ahead/image_raw: no CameraInfo of its own is in the bag: left out.\n" in text
 
 
 def test_what_is_not_known_of_the_only_camera_is_left_open(tmp_path):
