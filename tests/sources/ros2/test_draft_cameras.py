@@ -17,6 +17,7 @@ from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
+from semgrid_eval.recording.png import encode
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sources.ros2.inspection import inspect_bags
 from semgrid_eval.sources.ros2.mapping import load_map
@@ -187,7 +188,8 @@ def with_frame(message, frame):
 
 @pytest.mark.parametrize("root", ["", "/sensing"])
 @pytest.mark.parametrize("frame", ["cam", "nobody"])
-def test_no_camera_gets_the_calibration_of_one_above_it(tmp_path, root, frame):
+@pytest.mark.parametrize("others", [[], [depth("/rear/depth", "rear")]])
+def test_no_camera_gets_the_calibration_of_one_above_it(tmp_path, root, frame, others):
     text = drafted(
         tmp_path,
         [
@@ -195,10 +197,18 @@ def test_no_camera_gets_the_calibration_of_one_above_it(tmp_path, root, frame):
             with_frame(info(f"{root}/camera_info"), frame),
             image(f"{root}/image_raw", "cam"),
             image(f"{root}/rear/image_raw", "rear"),
+            *others,
         ],
     )
     assert cameras(text) == {"front": {"info": f"{root}/camera_info", "image": f"{root}/image_raw"}}
     assert f"# {root}/rear/image_raw: no CameraInfo of its own is in the bag: left out.\n" in text
+
+
+def test_a_compressed_image_is_beside_the_calibration_of_its_camera(tmp_path):
+    file = ros.compressed(START_NS, encode(np.zeros((128, 256, 3), np.uint8)), "png", frame="cam")
+    messages = [info("/camera_info"), sent("/image_raw/compressed", file), image("/rear/image_raw", "rear")]
+    text = drafted(tmp_path, [motion(), *messages])
+    assert cameras(text) == {"front": {"info": "/camera_info", "image": "/image_raw/compressed"}}
 
 
 def test_a_calibration_above_two_cameras_is_that_of_its_frame(tmp_path):
