@@ -1,5 +1,6 @@
 """`convert ros2`: bags as logs, by a map of their topics."""
 
+import logging
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
@@ -16,6 +17,7 @@ from semgrid_eval.sources.ros2.plan import BagPlan, Cut, plan_bag, told
 from semgrid_eval.sources.ros2.recording import Stretch
 from semgrid_eval.words import plural
 
+_log = logging.getLogger(__name__)
 _TOLD_AT_M = 50.0
 
 
@@ -28,6 +30,8 @@ def convert_bags(options: Ros2Options, out: Path, work: Work = IN_PROCESS) -> Co
     mapping, cut = load_map(Path(options.map)), Cut(options.split, options.recording_s)
     plans = _plans(options.bag, mapping, cut, work)
     jobs = [job for plan in plans for job in _jobs(plan, options.split)]
+    for odd in next((plan.odd_times for plan in plans if plan.odd_times), []):
+        _log.warning("%s", odd)
     summary = convert_jobs(jobs, out, work)
     summary.remark = _remark([plan for plan in plans if not plan.fault], mapping, out)
     return summary
@@ -63,8 +67,7 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
     lost = sum((plan.lost for plan in plans), Counter[str]())
     total, kept = sum(plan.frames for plan in plans), sum(len(each.frames) for plan in plans for each in plan.stretches)
     what = "frames and sweeps" if mapping.lidars else "frames"
-    parts = [f"Warning: {odd}" for odd in next((plan.odd_times for plan in plans if plan.odd_times), [])]
-    parts += [f"{kept} of {total} {what}; {told(lost)}", *_codings(plans[0])]
+    parts = [f"{kept} of {total} {what}; {told(lost)}", *_codings(plans[0])]
     if repeated := sum(plan.repeated for plan in plans):
         parts.append(f"{plural(repeated, 'message')} with a stamp that was there before left out")
     if mapping.single:

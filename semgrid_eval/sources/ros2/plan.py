@@ -36,7 +36,7 @@ class BagPlan:
     frames: int = 0  # that have been recorded, of all cameras; sweeps of all LiDARs
     lost: Counter[str] = field(default_factory=Counter)  # frames that are left out, by what they lack
     repeated: int = 0  # messages with the stamp of another one
-    odd_times: list[str] = field(default_factory=list)  # what times of points disagree with, LiDAR by LiDAR
+    odd_times: list[str] = field(default_factory=list)  # what is odd in times of points, LiDAR by LiDAR
     fault: str = ""  # why there are no recordings
 
 
