@@ -100,10 +100,9 @@ def stretches(
 ) -> list[tuple[int, list[FramePlan]]]:
     """Cut the frames of all sensors where one of them has a hole, and into parts of at most `longest_s`.
 
-    Windows count frames, so each recording has frames of all sensors, without a hole. Of `single` cameras there are no
-    grids: theirs may be missing, but where there is no other sensor. Each stretch comes with the number of its first
-    frame, as the first sensor that is not single counts them, else all together. `lost` counts the frames of stretches
-    that have fewer than two of a sensor.
+    Windows count frames, so each recording has frames of all sensors, without a hole, but for `single` cameras, of
+    which there are no grids: theirs may be missing. Each stretch comes with the number of its first frame, as the first
+    sensor that is not single counts them, else all together. `lost` counts the frames of stretches that are too short.
     """
     everything = sorted((each for frames in by_sensor.values() for each in frames), key=_order)
     stamps_ns = _stamps(everything)
@@ -119,7 +118,7 @@ def stretches(
         if min(needed) >= _LEAST_FRAMES:
             found.append((int(np.searchsorted(numbers, frames[0].stamp_ns)), frames))
         else:
-            lost["alone between holes"] += len(frames)
+            lost["where a sensor has fewer than two"] += len(frames)
     return found
 
 

@@ -67,7 +67,7 @@ def test_recordings_end_where_frames_are_missing():
     lost = Counter()
     found = stretches({"front": plans([0, 50, 100, 200, 250, 400, 500, 550])}, set(), 0.0, lost)
     assert numbers(found) == [(0, [0, 50, 100]), (3, [200, 250]), (6, [500, 550])]
-    assert lost["alone between holes"] == 1
+    assert lost["where a sensor has fewer than two"] == 1
 
 
 def test_long_stretches_are_cut_into_equal_parts():
@@ -111,4 +111,4 @@ def test_where_there_are_single_cameras_alone_one_may_die():
 def test_a_single_frame_of_a_single_camera_is_no_recording():
     lost = Counter()
     assert stretches({"left": plans([50], "left")}, {"left"}, 0.0, lost) == []
-    assert lost == {"alone between holes": 1}
+    assert lost == {"where a sensor has fewer than two": 1}
