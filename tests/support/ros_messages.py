@@ -5,12 +5,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from semgrid_eval.geometry import CAMERA_FROM_OPTICAL
 from semgrid_eval.recording.types import CameraCalibration, MotionSample
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
+TYPES.register(get_types_from_msg("float64 x_m\n", "my_msgs/msg/Pose"))  # which ROS 2 itself does not have
 OPTICAL, VEHICLE, LIDAR = "camera_left_optical", "base_link", "lidar"
 
 

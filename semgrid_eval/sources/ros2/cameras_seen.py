@@ -17,6 +17,7 @@ _GENERIC = re.compile(
     "labels?|segmentation|semantic|sensing|sensors?|to",
     re.IGNORECASE,
 )
+_TRANSPORT = re.compile("/compressed(Depth)?$")
 
 
 @dataclass(frozen=True)
@@ -35,11 +36,6 @@ class CameraSeen:
     def main(self) -> str:
         """The topic that is the camera's own."""
         return self.image or self.depth or self.disparity
-
-    @property
-    def is_single(self) -> bool:
-        """Whether nothing tells its depth."""
-        return not (self.disparity or self.depth or self.right)
 
     @property
     def lacks(self) -> str:
@@ -173,11 +169,11 @@ class _Finder:
         return (shape is not None and shape.coding in _DEPTH_CODINGS) or _has_word(name, _DEPTH_WORDS)
 
     def _borrows(self, camera: CameraSeen, cameras: Sequence[CameraSeen]) -> bool:
-        """Tell whether a camera has got a CameraInfo of its size that is another one's."""
+        """Tell whether a camera has got a CameraInfo of its size that is another one's: of another place and frame."""
         shared = any(each.info == camera.info for each in cameras if each is not camera)
-        is_beside = camera.main.startswith(f"{_namespace(camera.info)}/")
+        is_beside = _namespace(_TRANSPORT.sub("", camera.main)) == _namespace(camera.info)
         is_framed = camera.info != "" and self._topics[camera.info].frame == self._topics[camera.main].frame
-        return camera.is_single and shared and not (is_beside or is_framed)
+        return shared and not (is_beside or is_framed)
 
     def _is_of_right(self, info: str) -> bool:
         """Tell whether a CameraInfo is that of the second camera of a pair: P[3] = -f B."""

@@ -11,7 +11,7 @@ from semgrid_eval.labels import LAST_LABEL_ID
 from semgrid_eval.sources.kitti.labels import CLASSES, classes_of
 from semgrid_eval.sources.ros2.clouds import NUMBERS, WHOLE, Extras, columns_of, times_of, type_of
 from semgrid_eval.sources.ros2.labels import likely_ids
-from semgrid_eval.sources.ros2.lidars import LONGEST_NS, NS_BY_UNIT, fills
+from semgrid_eval.sources.ros2.lidars import LONGEST_NS, NS_BY_UNIT, unit_that_fills
 from semgrid_eval.sources.ros2.mapping import PointTimes
 
 _TIME_NAMES = ("t", "time", "timestamp", "time_stamp", "time_offset", "offset_time")
@@ -35,12 +35,12 @@ class TimesSeen:
         """
         if not self.span:
             return None
-        able = [unit for unit, unit_ns in NS_BY_UNIT.items() if self.span * unit_ns <= LONGEST_NS]
-        filling = [unit for unit in able if period_ns and fills(self.span * NS_BY_UNIT[unit], period_ns)]
-        for unit in (*filling, *able):
-            is_epoch = abs(self.first) * NS_BY_UNIT[unit] > _EPOCH_S * NS_BY_UNIT["s"]
-            return PointTimes(field=self.field, unit=unit, since="epoch" if is_epoch else "stamp")  # type: ignore[arg-type]
-        return None
+        longest = next((unit for unit, unit_ns in NS_BY_UNIT.items() if self.span * unit_ns <= LONGEST_NS), None)
+        unit = (unit_that_fills(self.span, period_ns) if period_ns else None) or longest
+        if unit is None:
+            return None
+        is_epoch = abs(self.first) * NS_BY_UNIT[unit] > _EPOCH_S * NS_BY_UNIT["s"]
+        return PointTimes(field=self.field, unit=unit, since="epoch" if is_epoch else "stamp")  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """`convert ros2`: bags as logs, by a map of their topics."""
 
+import logging
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
@@ -13,8 +14,10 @@ from semgrid_eval.sources.ros2.inspection import inspect_bags
 from semgrid_eval.sources.ros2.mapping import BagMap, load_map
 from semgrid_eval.sources.ros2.options import Ros2Options
 from semgrid_eval.sources.ros2.plan import BagPlan, Cut, plan_bag, told
+from semgrid_eval.sources.ros2.recording import Stretch
 from semgrid_eval.words import plural
 
+_log = logging.getLogger(__name__)
 _TOLD_AT_M = 50.0
 
 
@@ -27,6 +30,8 @@ def convert_bags(options: Ros2Options, out: Path, work: Work = IN_PROCESS) -> Co
     mapping, cut = load_map(Path(options.map)), Cut(options.split, options.recording_s)
     plans = _plans(options.bag, mapping, cut, work)
     jobs = [job for plan in plans for job in _jobs(plan, options.split)]
+    for odd in next((plan.odd_times for plan in plans if plan.odd_times), []):
+        _log.warning("%s", odd)
     summary = convert_jobs(jobs, out, work)
     summary.remark = _remark([plan for plan in plans if not plan.fault], mapping, out)
     return summary
@@ -62,13 +67,13 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
     lost = sum((plan.lost for plan in plans), Counter[str]())
     total, kept = sum(plan.frames for plan in plans), sum(len(each.frames) for plan in plans for each in plan.stretches)
     what = "frames and sweeps" if mapping.lidars else "frames"
-    parts = [f"Warning: {odd}" for odd in next((plan.odd_times for plan in plans if plan.odd_times), [])]
-    parts += [f"{kept} of {total} {what}; {told(lost)}", *_codings(plans[0])]
+    parts = [f"{kept} of {total} {what}; {told(lost)}", *_codings(plans[0])]
     if repeated := sum(plan.repeated for plan in plans):
         parts.append(f"{plural(repeated, 'message')} with a stamp that was there before left out")
     if mapping.single:
         worth = "labels of theirs can colour the points of a LiDAR: `colour_from` of the sensor"
         parts.append(f"nothing tells the depth of {', '.join(sorted(mapping.single))}; {worth}")
+    parts += _absences([each for plan in plans for each in plan.stretches], mapping)
     unlabelled = [name for name, camera in mapping.cameras.items() if camera.labels is None]
     if unlabelled:
         parts.append(f"no labels for {', '.join(unlabelled)}: {how_to_label(out)}")
@@ -76,6 +81,13 @@ def _remark(plans: Sequence[BagPlan], mapping: BagMap, out: Path) -> str:
         advice = "a grid needs `label_field` in the map, or a camera to colour them: `colour_from` of the sensor"
         parts.append(f"points of {', '.join(bare)} have no labels: {advice}")
     return "; ".join(parts)
+
+
+def _absences(recordings: Sequence[Stretch], mapping: BagMap) -> list[str]:
+    """Say for each camera how many recordings are without it."""
+    counts = {name: sum(name not in each.rigs for each in recordings) for name in mapping.cameras}
+    total = plural(len(recordings), "recording")
+    return [f"{name} has no frame in {count} of {total}" for name, count in counts.items() if count]
 
 
 def _codings(plan: BagPlan) -> list[str]:

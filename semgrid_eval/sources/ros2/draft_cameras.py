@@ -11,9 +11,10 @@ from semgrid_eval.sources.ros2.transforms import extrinsics_of
 _ONLY = "front"
 _LONGEST_NAME = 40  # of a sensor in a grid
 _VIRTUAL_BASELINE_M = 0.5
-_SINGLE = """\
-    # Nothing in the bag tells its depth (disparity, depth, or a right image whose CameraInfo has the baseline in P):
-    # no grids of its own, but its labels colour a LiDAR's points (colour_from of the sensor), and reports show it."""
+_SINGLE = (
+    "Nothing in the bag tells its depth (disparity, depth, or a right image whose CameraInfo has the baseline in P):",
+    "no grids of its own, but its labels colour a LiDAR's points (colour_from of the sensor), and reports show it.",
+)
 
 
 def draft_cameras(contents: Contents, vehicle: str) -> Iterator[str]:
@@ -86,7 +87,7 @@ def _depth(camera: CameraSeen) -> Iterator[str]:
     elif camera.right:
         yield f"    right: {camera.right}  # to be matched with the image"
     else:
-        yield _SINGLE
+        yield from (f"    # {line}" for line in _SINGLE)
     if camera.right_info and (camera.disparity or not camera.depth):
         yield f"    right_info: {camera.right_info}"
 

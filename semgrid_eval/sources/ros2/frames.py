@@ -100,25 +100,25 @@ def stretches(
 ) -> list[tuple[int, list[FramePlan]]]:
     """Cut the frames of all sensors where one of them has a hole, and into parts of at most `longest_s`.
 
-    Windows count frames, so no recording may have a hole, but for those of `single` cameras, of which there are no
-    grids. Each stretch comes with the number of its first frame, as the first sensor counts them. `lost` counts the
-    frames of stretches of a single frame.
+    Windows count frames, so each recording has frames of all sensors, without a hole, but for `single` cameras, of
+    which there are no grids: theirs may be missing. Each stretch comes with the number of its first frame, as the first
+    sensor that is not single counts them, else all together. `lost` counts the frames of stretches that are too short.
     """
-    stamps_by_sensor = {sensor: _stamps(frames) for sensor, frames in by_sensor.items()}
-    numbers = next(iter(stamps_by_sensor.values()))
-    counted = [stamps_ns for sensor, stamps_ns in stamps_by_sensor.items() if sensor not in single]
-    cuts_ns = {cut_ns for stamps_ns in counted for cut_ns in _holes(stamps_ns)}
     everything = sorted((each for frames in by_sensor.values() for each in frames), key=_order)
     stamps_ns = _stamps(everything)
+    counted = {sensor: _stamps(frames) for sensor, frames in by_sensor.items() if sensor not in single}
+    cuts_ns = {cut_ns for each in counted.values() for cut_ns in _holes(each)}
+    numbers = next(iter(counted.values()), stamps_ns)
     found = []
     for span_ns in _spans(stamps_ns, cuts_ns, longest_s):
         start, end = np.searchsorted(stamps_ns, span_ns)
         frames = everything[start:end]
         counts = Counter(each.sensor for each in frames)
-        if all(counts[sensor] >= _LEAST_FRAMES for sensor in by_sensor):
+        needed = [counts[sensor] for sensor in counted] or [len(frames)]
+        if min(needed) >= _LEAST_FRAMES:
             found.append((int(np.searchsorted(numbers, frames[0].stamp_ns)), frames))
         else:
-            lost["alone between holes"] += len(frames)
+            lost["where a sensor has fewer than two"] += len(frames)
     return found
 
 

@@ -55,21 +55,31 @@ def plan_lidar(lidar: LidarMap, vehicle: VehicleMap, facts: Facts) -> LidarPlan:
     return LidarPlan(lidar, Mount.of(ego_from_frame @ frame_from_lidar))
 
 
-def fills(span_ns: float, period_ns: float) -> bool:
-    """Return whether the points of a cloud can be so far apart in time where clouds come so often."""
-    return _SHARES[0] * period_ns <= span_ns <= _SHARES[1] * period_ns
+def unit_that_fills(span: float, period_ns: float) -> str | None:
+    """Return the unit in which the times of a cloud's points, `span` apart, are those of a turn until the next cloud.
+
+    There is one at most.
+    """
+    low_ns, high_ns = _SHARES[0] * period_ns, min(_SHARES[1] * period_ns, LONGEST_NS)
+    return next((unit for unit, unit_ns in NS_BY_UNIT.items() if low_ns <= span * unit_ns <= high_ns), None)
 
 
 def odd_times(name: str, lidar: LidarMap, facts: Facts) -> str:
-    """Say how the times of points disagree with how often clouds come; empty where they do not."""
+    """Say if the times of points tell nothing, or fit how often clouds come in another unit; else empty."""
     stamps_ns, spans = facts.arrivals[lidar.cloud].stamps_ns, facts.spans.get(name)
-    if lidar.times is None or not spans or len(stamps_ns) < 2:
+    if lidar.times is None or not spans:
         return ""
-    span_ns, period_ns = median(spans) * NS_BY_UNIT[lidar.times.unit], float(np.median(np.diff(stamps_ns)))
-    if fills(span_ns, period_ns):
+    field, unit = lidar.times.field, lidar.times.unit
+    if not any(spans):
+        return f"times of points are all the same in each cloud of {name} (its {field}): they count as of one time"
+    if len(stamps_ns) < 2:
         return ""
-    told = f"a cloud of {name} takes {span_ns / _NS_PER_MS:.3g} ms by its {lidar.times.field}"
-    return f"{told} and one comes every {period_ns / _NS_PER_MS:.3g} ms: is `unit: {lidar.times.unit}` right?"
+    span, period_ns = median(spans), float(np.median(np.diff(stamps_ns)))
+    better = unit_that_fills(span, period_ns)
+    if better in (None, unit):
+        return ""
+    told = f"a cloud of {name} takes {span * NS_BY_UNIT[unit] / _NS_PER_MS:.3g} ms by its {field}"
+    return f"{told} and one comes every {period_ns / _NS_PER_MS:.3g} ms: is its unit {better}, not {unit}?"
 
 
 class Sweeps:

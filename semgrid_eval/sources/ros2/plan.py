@@ -36,7 +36,7 @@ class BagPlan:
     frames: int = 0  # that have been recorded, of all cameras; sweeps of all LiDARs
     lost: Counter[str] = field(default_factory=Counter)  # frames that are left out, by what they lack
     repeated: int = 0  # messages with the stamp of another one
-    odd_times: list[str] = field(default_factory=list)  # what times of points disagree with, LiDAR by LiDAR
+    odd_times: list[str] = field(default_factory=list)  # what is odd in times of points, LiDAR by LiDAR
     fault: str = ""  # why there are no recordings
 
 
@@ -70,13 +70,19 @@ def _fill(plan: BagPlan, path: Path, mapping: BagMap, cut: Cut, facts: Facts) ->
         group=plan.name,
         clock=mapping.clock,
         kinds=facts.kinds,
-        rigs=rigs,
         lidars=lidars,
     )
     for first, frames in stretches(by_sensor, mapping.single, cut.longest_s, plan.lost):
         motion = rates.between(frames[0].stamp_ns - AROUND_NS, frames[-1].stamp_ns + AROUND_NS)
-        name = f"{plan.name}_{first:06d}"
-        plan.stretches.append(stretch(name=name, frames=tuple(frames), motion=motion))
+        seen = {frame.sensor for frame in frames}
+        plan.stretches.append(
+            stretch(
+                name=f"{plan.name}_{first:06d}",
+                rigs={name: rig for name, rig in rigs.items() if name in seen},
+                frames=tuple(frames),
+                motion=motion,
+            )
+        )
     if not plan.stretches:
         raise InputError(f"gives no recording; {told(plan.lost)}")
 

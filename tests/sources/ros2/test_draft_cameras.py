@@ -17,6 +17,7 @@ from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
+from semgrid_eval.recording.png import encode
 from semgrid_eval.sensors.camera import CameraSensor
 from semgrid_eval.sources.ros2.inspection import inspect_bags
 from semgrid_eval.sources.ros2.mapping import load_map
@@ -160,19 +161,61 @@ def test_a_camera_without_calibration_is_left_out_and_the_others_stay(tmp_path):
 def test_a_camera_without_depth_is_drafted_with_what_it_is_good_for_beside_others_and_alone(tmp_path):
     rear = [
         info("/rear/info"),
-        image("/rear/image", "rear"),
+        image("/rear/image", optical("rear")),
         sent("/tf_static", camera_link("rear", ONE.calibration())),
     ]
-    told = "    # Nothing in the bag tells its depth (disparity, depth, or a right image whose CameraInfo has"
+    told = (
+        "    # Nothing in the bag tells its depth (disparity, depth, or a right image whose CameraInfo has the baseline"
+        " in P):\n"
+        "    # no grids of its own, but its labels colour a LiDAR's points (colour_from of the sensor), and reports"
+        " show it.\n"
+    )
     alone, beside = tmp_path / "alone", tmp_path / "beside"
     for here, others in ((alone, [motion()]), (beside, [*rig(front=Mount()), image("/side/image", "side")])):
         here.mkdir()
         text = drafted(here, [*others, *rear])
         assert told in text
+        assert "\\n" not in text
     assert cameras(text)["rear"] == {"info": "/rear/info", "image": "/rear/image"}
     assert text.count(told) == 1
     ended = run_command(f"convert ros2 {beside}/drive {beside}/logs --map {beside}/map.yaml --workers 1".split())
-    assert "Error: " in ended.err, "a single frame is no recording"
+    assert ended.code == 0, ended.err
+
+
+def with_frame(message, frame):
+    return message._replace(message=replace(message.message, header=ros.header(START_NS, frame)))
+
+
+@pytest.mark.parametrize("root", ["", "/sensing"])
+@pytest.mark.parametrize("frame", ["cam", "nobody"])
+@pytest.mark.parametrize("others", [[], [depth("/rear/depth", "rear")]])
+def test_no_camera_gets_the_calibration_of_one_above_it(tmp_path, root, frame, others):
+    text = drafted(
+        tmp_path,
+        [
+            motion(),
+            with_frame(info(f"{root}/camera_info"), frame),
+            image(f"{root}/image_raw", "cam"),
+            image(f"{root}/rear/image_raw", "rear"),
+            *others,
+        ],
+    )
+    assert cameras(text) == {"front": {"info": f"{root}/camera_info", "image": f"{root}/image_raw"}}
+    assert f"# {root}/rear/image_raw: no CameraInfo of its own is in the bag: left out.\n" in text
+
+
+def test_a_compressed_image_is_beside_the_calibration_of_its_camera(tmp_path):
+    file = ros.compressed(START_NS, encode(np.zeros((128, 256, 3), np.uint8)), "png", frame="cam")
+    messages = [info("/camera_info"), sent("/image_raw/compressed", file), image("/rear/image_raw", "rear")]
+    text = drafted(tmp_path, [motion(), *messages])
+    assert cameras(text) == {"front": {"info": "/camera_info", "image": "/image_raw/compressed"}}
+
+
+def test_a_calibration_above_two_cameras_is_that_of_its_frame(tmp_path):
+    images = [image(f"/{name}/image_raw", name) for name in ("ahead", "rear")]
+    text = drafted(tmp_path, [motion(), with_frame(info("/camera_info"), "rear"), *images])
+    assert cameras(text) == {"front": {"info": "/camera_info", "image": "/rear/image_raw"}}
+    assert "# /ahead/image_raw: no CameraInfo of its own is in the bag: left out.\n" in text
 
 
 def test_what_is_not_known_of_the_only_camera_is_left_open(tmp_path):

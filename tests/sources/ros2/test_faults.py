@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.bad_bags import MESSAGES, TEXT, WORLD, fault
-from support.bags import IMAGE, RecordingBag, Sent, Variant
+from support.bags import IMAGE, RecordingBag, Sent, Variant, write_bag
 from support.ros_messages import camera_info, image, kind, matrix
 from support.toy_world import HEIGHT, START_NS, WIDTH
 
@@ -189,12 +189,13 @@ def test_types_that_do_not_fit(tmp_path, old, new, said):
     assert said in fault(tmp_path, MESSAGES, text=TEXT.replace(old, new))
 
 
-def test_an_unknown_type(tmp_path):
-    strange = [Sent("/mine", MESSAGES[0].received_ns, kind("std_msgs/Header")(MESSAGES[1].message.header.stamp, "a"))]
-    line = fault(tmp_path, [*strange, *MESSAGES], text=TEXT.replace("topic: /odom", "topic: /mine"))
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_type_that_ros_itself_does_not_have(tmp_path, storage):
+    strange = Sent("/mine", MESSAGES[0].received_ns, kind("my_msgs/Pose")(x_m=1.0))
+    write_bag(tmp_path / "drive", [strange, *MESSAGES], storage)
+    line = fault(tmp_path, text=TEXT.replace("topic: /odom", "topic: /mine"))
     assert line == (
-        "drive: /mine: is std_msgs/msg/Header; speed is read from nav_msgs/msg/Odometry or "
-        "geometry_msgs/msg/TwistStamped"
+        "drive: /mine: is my_msgs/msg/Pose; speed is read from nav_msgs/msg/Odometry or geometry_msgs/msg/TwistStamped"
     )
 
 

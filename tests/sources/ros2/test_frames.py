@@ -1,6 +1,7 @@
 from collections import Counter
 
 import numpy as np
+import pytest
 
 from semgrid_eval.sources.ros2.arrivals import Arrivals, Ledger
 from semgrid_eval.sources.ros2.frames import FramePlan, covered, frames_of, stretches
@@ -66,7 +67,7 @@ def test_recordings_end_where_frames_are_missing():
     lost = Counter()
     found = stretches({"front": plans([0, 50, 100, 200, 250, 400, 500, 550])}, set(), 0.0, lost)
     assert numbers(found) == [(0, [0, 50, 100]), (3, [200, 250]), (6, [500, 550])]
-    assert lost["alone between holes"] == 1
+    assert lost["where a sensor has fewer than two"] == 1
 
 
 def test_long_stretches_are_cut_into_equal_parts():
@@ -85,3 +86,29 @@ def test_a_hole_of_a_single_camera_ends_nothing():
     front, rear = plans(range(0, 500, 50)), plans([10, 60, 110, 310, 360, 410], "rear")
     ((first, frames),) = stretches({"front": front, "rear": rear}, {"rear"}, 0.0, Counter())
     assert (first, len(frames)) == (0, 16)
+
+
+@pytest.mark.parametrize("rear_ms", [range(410, 1000, 50), range(10, 500, 50), [110], []])
+@pytest.mark.parametrize("first", ["front", "rear"])
+def test_a_single_camera_that_starts_late_or_dies_takes_no_frame_of_others_away(rear_ms, first):
+    front, lost = plans(range(0, 1000, 50)), Counter()
+    by_sensor = {"front": front, "rear": plans(rear_ms, "rear")}
+    in_order = {first: by_sensor.pop(first), **by_sensor}
+    found = stretches(in_order, {"rear"}, 0.4, lost)
+    assert [each for _, frames in found for each in frames if each.sensor == "front"] == front
+    assert len({number for number, _ in found}) == len(found) == 3
+    assert lost.total() == 0
+
+
+def test_where_there_are_single_cameras_alone_one_may_die():
+    """Recordings are numbered by the frames of both."""
+    left, right = plans(range(0, 200, 50), "left"), plans(range(0, 1000, 50), "right")
+    found = stretches({"left": left, "right": right}, {"left", "right"}, 0.4, Counter())
+    assert [number for number, _ in found] == [0, 11, 17]
+    assert sum(len(frames) for _, frames in found) == 24
+
+
+def test_a_single_frame_of_a_single_camera_is_no_recording():
+    lost = Counter()
+    assert stretches({"left": plans([50], "left")}, {"left"}, 0.0, lost) == []
+    assert lost == {"where a sensor has fewer than two": 1}

@@ -122,3 +122,30 @@ def test_images_that_are_missing_end_no_recording(bag):
     with LogReader(log) as reader:
         assert len(list(reader.sweeps("top"))) == 8
         assert len(list(reader.frames("left"))) == 12
+
+
+@pytest.mark.parametrize(("first_ms", "last_ms"), [(600, 10_000), (0, 300)])
+def test_a_recording_in_which_a_camera_has_no_frame_is_one_without_that_camera(bag, first_ms, last_ms):
+    """The left camera starts late, or dies; the LiDAR loses no sweep."""
+    messages = [
+        each
+        for each in bag.messages()
+        if each.topic != "/left/image" or first_ms <= (each.received_ns - START_NS) * 1e-6 <= last_ms
+    ]
+    write_bag(Path("part"), messages)
+    said = ran("convert ros2 part logs --workers 1 --recording-s 0.5")
+    logs = find_logs(Path("logs"))
+    assert "left has no frame in 1 of 2 recordings" in said
+    assert sum(len(sweeps_of(log)) for log in logs) == 8
+    assert sorted(cameras_of(log) for log in logs) == [("left", "right"), ("right",)]
+    assert [check_log(log).findings for log in logs] == [(), ()]
+
+
+def sweeps_of(log):
+    with LogReader(log) as reader:
+        return list(reader.sweeps("top"))
+
+
+def cameras_of(log):
+    with LogReader(log) as reader:
+        return reader.scene.cameras

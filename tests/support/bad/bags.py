@@ -91,6 +91,12 @@ def _unstamped(message: Any) -> Any:
     return replace(message, header=replace(message.header, stamp=zero))
 
 
+def _apart(message: Any) -> Any:
+    stamp = message.header.stamp
+    moved = replace(stamp, nanosec=stamp.nanosec + 25_000_000)
+    return replace(message, header=replace(message.header, stamp=moved))
+
+
 def _infos(size: tuple[int, int], k: Any) -> Change:
     return lambda message: ros.camera_info(1, size, k, p=k.any())
 
@@ -104,7 +110,7 @@ def _unlinked(child: str) -> Callable[[], Any]:
 
 def _strange() -> Iterator[Sent]:
     first = messages()[0]
-    yield Sent("/odom", first.received_ns, ros.header(1, "mine"))
+    yield Sent("/odom", first.received_ns, ros.kind("my_msgs/Pose")(x_m=1.0))
     yield from (each for each in messages() if each.topic != "/odom")
 
 
@@ -153,6 +159,7 @@ BAGS = Kind(
         _changed("no calibration: K and P are zero", "/front/info", _infos((WIDTH, HEIGHT), np.zeros((3, 3)))),
         _changed("a calibration of another image size", "/front/info", _infos((640, 480), np.eye(3) * 300)),
         _changed("images of another encoding than before", "/front/image", _gray, last=True),
+        _changed("labels that are 25 ms apart from other pictures", "/front/labels", _apart),
         _cut("mcap"),
         _cut("sqlite3"),
         Bad("a folder without index", CONVERT, spoil=lambda: Path("drive/metadata.yaml").unlink()),
