@@ -17,7 +17,7 @@ from semgrid_eval.files import read_bytes
 from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3, Floats, roll_pitch_yaw_of
 from semgrid_eval.recording.colour import ImageSize, read_size
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame
-from semgrid_eval.sources.argoverse2.tables import MAX_FILE_BYTES, Table, read_table
+from semgrid_eval.sources.argoverse2.tables import MAX_FILE_BYTES, MAX_STAMP_NS, Table, read_table
 from semgrid_eval.sources.argoverse2.tracks import POSE, transform
 from semgrid_eval.sources.argoverse2.vehicle import EGO_FROM_ARGOVERSE
 
@@ -30,9 +30,14 @@ _INTRINSICS = {
 _STAMP = re.compile(r"[0-9]{1,19}")
 
 
+Images = dict[int, Path]
+"""Files by time."""
+
+
 def stamped(folder: Path, pattern: str) -> dict[int, Path]:
     """Return the files of a folder whose names are times, by time."""
-    return {int(path.stem): path for path in sorted(folder.glob(pattern)) if _STAMP.fullmatch(path.stem)}
+    named = (path for path in sorted(folder.glob(pattern)) if _STAMP.fullmatch(path.stem))
+    return {stamp_ns: path for path in named if (stamp_ns := int(path.stem)) < MAX_STAMP_NS}
 
 
 def cameras_folder(log: Path) -> Path:
@@ -40,7 +45,7 @@ def cameras_folder(log: Path) -> Path:
     return log / "sensors" / "cameras"
 
 
-def images_of(log: Path, camera: str) -> dict[int, Path]:
+def images_of(log: Path, camera: str) -> Images:
     """Return the images of a camera by time."""
     return stamped(cameras_folder(log) / camera, "*.jpg")
 

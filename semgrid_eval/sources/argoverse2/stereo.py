@@ -22,7 +22,7 @@ from semgrid_eval.sources.rectification import Rectification, baseline_m
 
 CAMERA = LEFT
 """Name in logs of the rectified left camera."""
-_OPTION = "--stereo-every"
+OPTION = "--stereo-every"
 _NO_LENS = np.zeros(5)
 _ALL_SEEN = 0.0  # OpenCV's alpha: the rectified image shows only what the raw one shows
 
@@ -37,7 +37,7 @@ class StereoCamera:
             InputError: a file, a camera in it or a column is missing, or a value is impossible.
         """
         intrinsics, place = calibration_files(log)
-        left, right = (read_camera(log, name, _OPTION) for name in (LEFT, RIGHT))
+        left, right = (read_camera(log, name, OPTION) for name in (LEFT, RIGHT))
         if left.size_px != right.size_px:
             fault = f"{RIGHT} is {told(right.size_px)}, but {LEFT} is {told(left.size_px)}"
             raise InputError(fault, path=intrinsics, field="width_px, height_px")
