@@ -3,12 +3,11 @@
 from functools import partial
 from pathlib import Path
 
-from semgrid_eval.recording.types import CameraFrame
+from semgrid_eval.recording.types import CameraCalibration, CameraFrame
 from semgrid_eval.sources.argoverse2.cameras import (
     Camera,
     Images,
     Look,
-    calibration_of,
     cameras_folder,
     images_of,
     read_camera,
@@ -30,7 +29,7 @@ def ring_look(log: Path, name: str, images: Images) -> Look:
         InputError: a file, the camera in it or a column is missing, or a value is impossible.
     """
     camera = read_camera(log, name, OPTION)
-    calibration = calibration_of(camera.matrix, camera.ego_from_optical, None)
+    calibration = CameraCalibration.of(camera.matrix, camera.ego_from_optical, None)
     return Look(calibration, {stamp_ns: partial(_frame, camera, stamp_ns, path) for stamp_ns, path in images.items()})
 
 

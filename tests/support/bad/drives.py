@@ -67,6 +67,19 @@ def _gone(words: str, name: str) -> Bad:
     return Bad(words, KITTI, spoil=lambda: (FOLDER / name).unlink())
 
 
+def _right_images_alone() -> None:
+    Sequence(images=True).write(Path("KITTI"), "04")
+    for name in ("image_2", "velodyne"):
+        rmtree(FOLDER.with_name("04") / name)
+
+
+def _left_images_without_projection() -> None:
+    folder = Sequence(images=True).write(Path("KITTI"), "04")
+    rmtree(folder / "image_3")
+    calibration = folder / "calib.txt"
+    calibration.write_text("".join(calibration.read_text().splitlines(keepends=True)[-1:]))
+
+
 def _table(words: str, path: Path, make: Callable[[], dict[str, list[Any]]], change: Callable[..., object]) -> Bad:
     def spoil() -> None:
         table = make()
@@ -101,6 +114,8 @@ DRIVES = Kind(
         _file("a point that is not a number", "velodyne/000001.bin", _points((1, np.nan, 0, 0), (1, 2, 3, 0))),
         _gone("a lost scan", "velodyne/000002.bin"),
         _gone("no poses", "poses.txt"),
+        Bad("right images without left ones, and no scans", KITTI, spoil=_right_images_alone),
+        Bad("a camera that is not calibrated", KITTI, spoil=_left_images_without_projection),
         _table("a box that is not a number", BOXES, columns, _cell("tx_m", float("nan"))),
         _table("a box of an unknown category", BOXES, columns, _cell("category", "TANK")),
         _table("boxes without poses", POSES, lambda: pose_columns(3), lambda table: None),
