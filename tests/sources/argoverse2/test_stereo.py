@@ -127,6 +127,14 @@ def test_an_image_alone_and_those_beyond_the_boxes_are_left_out(folder, tmp_path
     assert remark.startswith("left out: 2 images outside the boxes' times, 1 image without a partner; no labels")
 
 
+def test_a_lost_partner_leaves_the_longest_part_without_a_hole(folder, tmp_path):
+    sorted((folder / "sensors" / "cameras" / RIGHT).iterdir())[1].unlink()
+    assert [each.stamp_ns for each in frames(tmp_path)[1]] == STAMPS_NS[::2], "it is not one of those taken"
+    assert [each.stamp_ns for each in frames(tmp_path, stereo_every=1)[1]] == STAMPS_NS[2:]
+    remark = converted(tmp_path, stereo_every=1).remark
+    assert remark.startswith("left out: 1 image without a partner, 2 images before or after a hole; no labels")
+
+
 def test_images_after_the_last_box_alone_are_no_camera(folder, tmp_path):
     for name in (LEFT, RIGHT):
         for path in sorted((folder / "sensors" / "cameras" / name).iterdir()):
