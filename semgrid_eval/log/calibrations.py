@@ -47,9 +47,10 @@ def read_size(known: bytes) -> ImageSize:
         InputError: it is none.
     """
     camera = CalibrationMessage.FromString(known)
-    if not camera.width * camera.height:
-        raise InputError(f"is for pictures of {camera.width} x {camera.height}")
-    return ImageSize(camera.width, camera.height)
+    size = ImageSize(camera.width, camera.height)
+    if not size.width * size.height:
+        raise InputError(f"is for pictures of {size}")
+    return size
 
 
 def read_calibration(known: bytes, rest: bytes) -> CameraCalibration:

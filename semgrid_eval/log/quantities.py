@@ -14,7 +14,7 @@ from semgrid_eval.log.findings import Finding, error
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import camera_topic, lidar_of, lidar_topic
 from semgrid_eval.motion import MotionSample
-from semgrid_eval.recording.colour import read_size
+from semgrid_eval.recording.colour import ImageSize, read_size
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame
 
@@ -79,7 +79,7 @@ def camera_extents(log: LogReader, camera: str) -> Generator[Finding, None, Exte
 
     An image that cannot be decoded, or has another size than those before, is an error, and what follows is left out.
     """
-    size: tuple[int, int] | None = None
+    size: ImageSize | None = None
     found: Extents = {}
     for frame in log.frames(camera, images=True):
         try:
@@ -138,15 +138,15 @@ def _frame_values(frame: CameraFrame) -> Iterator[tuple[str, str, Extent]]:
         yield topics.LABEL, "label_id", Extent(int(np.min(labelled)), int(np.max(labelled)))
 
 
-def _require_size(frame: CameraFrame, size: tuple[int, int] | None) -> tuple[int, int]:
-    """Return the size (width, height) of all pictures of a frame, that of the frames before if there were any."""
+def _require_size(frame: CameraFrame, size: ImageSize | None) -> ImageSize:
+    """Return the size of all pictures of a frame, that of the frames before if there were any."""
     for channel, png in (("disparity", frame.disparity_png), ("label", frame.label_png), ("image", frame.image_file)):
         if png is None:
             continue
         found = read_size(png)
         size = size or found
         if found != size:
-            raise InputError(f"is {found.width} x {found.height}, not {size[0]} x {size[1]}", field=channel)
+            raise InputError(f"is {found}, not {size}", field=channel)
     assert size is not None
     return size
 

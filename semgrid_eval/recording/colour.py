@@ -23,6 +23,9 @@ class ImageSize(NamedTuple):
     width: int
     height: int
 
+    def __str__(self) -> str:
+        return f"{self.width} x {self.height}"
+
 
 def kind_of(data: bytes) -> Kind:
     """Tell by its first bytes what kind of file an image is; what is not JPEG counts as PNG."""
@@ -40,7 +43,7 @@ def read_size(data: bytes, path: Path | None = None) -> ImageSize:
     except _DECODER_ERRORS as error:
         raise _damaged(error, path) from error
     if size.width * size.height > png.MAX_PIXELS:
-        raise InputError(f"is {size.width} x {size.height}; at most {png.MAX_PIXELS} pixels are allowed", path=path)
+        raise InputError(f"is {size}; at most {png.MAX_PIXELS} pixels are allowed", path=path)
     if mode not in _JPEG_MODES:
         raise InputError(f"is a JPEG file in {mode}; colour or gray is needed", path=path)
     return size

@@ -54,9 +54,9 @@ class LidarSweep:
         count = len(self.points_m)
         if count > MAX_POINTS:
             raise InputError(f"has {count} points; at most {MAX_POINTS} are allowed")
-        for what, values in (("labels", self.label_id), ("intensities", self.intensity)):
+        for values, what in ((self.label_id, ("label",)), (self.intensity, ("intensity", "intensities"))):
             if values is not None and len(values) != count:
-                raise InputError(f"has {what} of {len(values)} and places of {plural(count, 'point')}")
+                raise InputError(f"has {plural(len(values), *what)} for {plural(count, 'point')}")
         within = (np.abs(self.points_m) <= MAX_RANGE_M).all(axis=1)  # what is not a number is not, either
         if not within.all():
             number = int(np.flatnonzero(~within)[0])

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
+from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3, Floats, roll_pitch_yaw_of
 from semgrid_eval.motion import MotionSample as MotionSample
 from semgrid_eval.motion import Pose as Pose
 from semgrid_eval.recording.lidar import LidarSweep
@@ -42,6 +42,15 @@ class CameraCalibration:
                 raise InputError(f"{value} is not a finite number", field=name)
             if name in ("fx_px", "fy_px", "baseline_m") and value <= 0:
                 raise InputError(f"{value} is not positive", field=name)
+
+    @classmethod
+    def of(cls, matrix: Floats, ego_from_optical: SE3, baseline_m: float | None) -> Self:
+        """Take the numbers out of K (3, 3), or P (3, 4), and of where the optical frame is in the vehicle's."""
+        ego_from_camera = ego_from_optical @ CAMERA_FROM_OPTICAL.inverse()
+        fx_px, fy_px, u0_px, v0_px = (float(matrix[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
+        x_m, y_m, z_m = ego_from_camera.translation_m.tolist()
+        roll_pitch_yaw_rad = roll_pitch_yaw_of(ego_from_camera.rotation)
+        return cls(fx_px, fy_px, u0_px, v0_px, baseline_m, x_m, y_m, z_m, *roll_pitch_yaw_rad)
 
     @property
     def depth_disparity_m_px(self) -> float:

@@ -43,3 +43,7 @@ def test_a_jpeg_file_that_ends_early_is_refused(end):
 def test_inks_are_refused():
     with pytest.raises(InputError, match="is a JPEG file in CMYK; colour or gray is needed"):
         require_whole(photo("CMYK"))
+
+
+def test_a_size_is_written_as_width_and_height():
+    assert f"{ImageSize(width=320, height=96)}" == "320 x 96"

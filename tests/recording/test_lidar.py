@@ -24,8 +24,11 @@ def test_points_that_cannot_be_are_refused(point, line):
 
 
 def test_labels_of_another_count_than_points_are_refused():
-    with pytest.raises(InputError, match=r"^has labels of 1 and places of 2 points$"):
+    with pytest.raises(InputError, match=r"^has 1 label for 2 points$"):
         sweep(0, [(1.0, 2.0, 3.0)] * 2, ["car"])
+    points_m = np.zeros((1, 3), np.float32)
+    with pytest.raises(InputError, match=r"^has 2 intensities for 1 point$"):
+        LidarSweep(0, TURNED, points_m, np.zeros(2, np.float32), None)
 
 
 def test_a_sweep_has_a_bound():

@@ -14,10 +14,10 @@ import numpy as np
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import read_bytes
-from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3, Floats, roll_pitch_yaw_of
+from semgrid_eval.geometry import SE3, Floats
 from semgrid_eval.recording.colour import ImageSize, read_size
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame
-from semgrid_eval.sources.argoverse2.tables import MAX_FILE_BYTES, Table, read_table
+from semgrid_eval.sources.argoverse2.tables import MAX_FILE_BYTES, MAX_STAMP_NS, Table, read_table
 from semgrid_eval.sources.argoverse2.tracks import POSE, transform
 from semgrid_eval.sources.argoverse2.vehicle import EGO_FROM_ARGOVERSE
 
@@ -30,9 +30,14 @@ _INTRINSICS = {
 _STAMP = re.compile(r"[0-9]{1,19}")
 
 
+Images = dict[int, Path]
+"""Files by time."""
+
+
 def stamped(folder: Path, pattern: str) -> dict[int, Path]:
     """Return the files of a folder whose names are times, by time."""
-    return {int(path.stem): path for path in sorted(folder.glob(pattern)) if _STAMP.fullmatch(path.stem)}
+    named = (path for path in sorted(folder.glob(pattern)) if _STAMP.fullmatch(path.stem))
+    return {stamp_ns: path for path in named if (stamp_ns := int(path.stem)) < MAX_STAMP_NS}
 
 
 def cameras_folder(log: Path) -> Path:
@@ -40,7 +45,7 @@ def cameras_folder(log: Path) -> Path:
     return log / "sensors" / "cameras"
 
 
-def images_of(log: Path, camera: str) -> dict[int, Path]:
+def images_of(log: Path, camera: str) -> Images:
     """Return the images of a camera by time."""
     return stamped(cameras_folder(log) / camera, "*.jpg")
 
@@ -75,8 +80,7 @@ class Camera:
         data = read_bytes(path, limit=MAX_FILE_BYTES)
         size_px = read_size(data, path)
         if size_px != self.size_px:
-            known = f"{self.told_by.name} calibrates {told(self.size_px)}"
-            raise InputError(f"is {told(size_px)}, but {known}", path=path)
+            raise InputError(f"is {size_px}, but {self.told_by.name} calibrates {self.size_px}", path=path)
         return data
 
 
@@ -98,20 +102,6 @@ def read_camera(log: Path, name: str, option: str) -> Camera:
     table = read_table(places, {"sensor_name": "string", **POSE})
     argoverse_from_optical = transform(table, _row(table, name, places, option), places)
     return Camera(matrix, size_px, EGO_FROM_ARGOVERSE @ argoverse_from_optical, intrinsics)
-
-
-def calibration_of(matrix: Floats, ego_from_optical: SE3, baseline_m: float | None) -> CameraCalibration:
-    """Put a calibration together; `matrix` is K (3, 3), or P (3, 4)."""
-    ego_from_camera = ego_from_optical @ CAMERA_FROM_OPTICAL.inverse()
-    fx_px, fy_px, u0_px, v0_px = (float(matrix[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
-    x_m, y_m, z_m = ego_from_camera.translation_m.tolist()
-    angles_rad = roll_pitch_yaw_of(ego_from_camera.rotation)
-    return CameraCalibration(fx_px, fy_px, u0_px, v0_px, baseline_m, x_m, y_m, z_m, *angles_rad)
-
-
-def told(size_px: ImageSize) -> str:
-    """Write a size of images as messages do."""
-    return f"{size_px.width} x {size_px.height}"
 
 
 def _row(table: Table, name: str, path: Path, option: str) -> int:

@@ -9,12 +9,14 @@ SRC/<split>/<log>/sensors/cameras/ring_*           undistorted images of single 
 SRC/<split>/<log>/calibration/*.feather            of cameras, where there are images
 """
 
+from collections import Counter
 from pathlib import Path
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.log.convert import IN_PROCESS, ConversionJob, ConversionSummary, Work, convert_jobs, how_to_label
 from semgrid_eval.sources.argoverse2.drive import Drive
 from semgrid_eval.sources.argoverse2.source import ArgoverseOptions
+from semgrid_eval.sources.argoverse2.taken import Every
 from semgrid_eval.words import plural
 
 SPLITS = ("train", "val", "test")
@@ -40,7 +42,7 @@ def _drives(options: ArgoverseOptions) -> list[Drive]:
             raise InputError(f"{split} is not one of: {', '.join(there) or 'none'}", path=options.src, field="split")
     chosen = [split for split in there if split in options.split or not options.split]
     found = [
-        Drive(folder, split, options.stereo_every, options.ring_every)
+        Drive(folder, split, Every(options.stereo_every, options.ring_every))
         for split in chosen
         for folder in sorted((options.src / split).iterdir())
         if folder.is_dir() and not folder.name.startswith(".")
@@ -52,5 +54,13 @@ def _drives(options: ArgoverseOptions) -> list[Drive]:
 
 def _remark(drives: list[Drive], out: Path) -> str:
     """Say in one line what is not there."""
-    seen = sum(bool(drive.pairs or drive.rings) for drive in drives)
-    return f"no labels for the cameras of {plural(seen, 'log')}: {how_to_label(out)}" if seen else ""
+    lost = sum((drive.taken.lost for drive in drives), Counter[str]())
+    parts = [f"left out: {_told(lost)}"] if lost else []
+    if seen := sum(bool(drive.taken.files) for drive in drives):
+        parts.append(f"no labels for the cameras of {plural(seen, 'log')}: {how_to_label(out)}")
+    return "; ".join(parts)
+
+
+def _told(lost: Counter[str]) -> str:
+    """Write how many images are left out, by why."""
+    return ", ".join(f"{plural(count, 'image')} {why}" for why, count in lost.items())

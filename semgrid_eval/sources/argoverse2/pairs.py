@@ -23,15 +23,24 @@ class Pair:
     right: Path
 
 
-def pairs_of(log: Path) -> tuple[Pair, ...]:
-    """Find the pairs of a log, in the order of time; images of one camera alone are left out.
+@dataclass(frozen=True)
+class Pairs:
+    """What a log holds of both cameras."""
+
+    pairs: tuple[Pair, ...] = ()  # in the order of time
+    alone_ns: tuple[int, ...] = ()  # times of images without a partner
+    lefts_ns: tuple[int, ...] = ()  # times of all left images
+
+
+def pairs_of(log: Path) -> Pairs:
+    """Find the pairs of a log.
 
     Raises:
         InputError: there are images, but no pair.
     """
     left, right = (images_of(log, name) for name in (LEFT, RIGHT))
     if not (left or right):
-        return ()
+        return Pairs()
     for name, found, other, there in ((LEFT, left, RIGHT, right), (RIGHT, right, LEFT, left)):
         if not found:
             raise InputError(f"holds no image, but {other} holds {len(there)}", path=cameras_folder(log) / name)
@@ -45,7 +54,9 @@ def pairs_of(log: Path) -> tuple[Pair, ...]:
     if not pairs:
         fault = f"holds no image within {TOGETHER_NS * 1e-6:g} ms of one of {LEFT}"
         raise InputError(fault, path=cameras_folder(log) / RIGHT)
-    return pairs
+    rights_alone = set(right) - {int(pair.right.stem) for pair in pairs}
+    alone_ns = [*rights_alone, *(set(left) - {pair.stamp_ns for pair in pairs})]
+    return Pairs(pairs, tuple(sorted(alone_ns)), tuple(left))
 
 
 def _nearest(stamp_ns: int, others_ns: NDArray[np.int64]) -> int:

@@ -14,15 +14,15 @@ from semgrid_eval.errors import InputError, located
 from semgrid_eval.geometry import SE3, Floats
 from semgrid_eval.recording.disparity import coded_disparity
 from semgrid_eval.recording.png import encode_gray
-from semgrid_eval.recording.types import CameraFrame
-from semgrid_eval.sources.argoverse2.cameras import Camera, Look, calibration_files, calibration_of, read_camera, told
+from semgrid_eval.recording.types import CameraCalibration, CameraFrame
+from semgrid_eval.sources.argoverse2.cameras import Camera, Look, calibration_files, read_camera
 from semgrid_eval.sources.argoverse2.pairs import LEFT, RIGHT, Pair
 from semgrid_eval.sources.matching import SemiGlobalMatching, grey_of
 from semgrid_eval.sources.rectification import Rectification, baseline_m
 
 CAMERA = LEFT
 """Name in logs of the rectified left camera."""
-_OPTION = "--stereo-every"
+OPTION = "--stereo-every"
 _NO_LENS = np.zeros(5)
 _ALL_SEEN = 0.0  # OpenCV's alpha: the rectified image shows only what the raw one shows
 
@@ -37,15 +37,15 @@ class StereoCamera:
             InputError: a file, a camera in it or a column is missing, or a value is impossible.
         """
         intrinsics, place = calibration_files(log)
-        left, right = (read_camera(log, name, _OPTION) for name in (LEFT, RIGHT))
+        left, right = (read_camera(log, name, OPTION) for name in (LEFT, RIGHT))
         if left.size_px != right.size_px:
-            fault = f"{RIGHT} is {told(right.size_px)}, but {LEFT} is {told(left.size_px)}"
+            fault = f"{RIGHT} is {right.size_px}, but {LEFT} is {left.size_px}"
             raise InputError(fault, path=intrinsics, field="width_px, height_px")
         right_from_left = right.ego_from_optical.inverse() @ left.ego_from_optical
         with located(path=place):
             turns, projections = _rectified(left, right, right_from_left)
             rectified = SE3(left.ego_from_optical.rotation @ turns[0].T, left.ego_from_optical.translation_m)
-            self.calibration = calibration_of(projections[0], rectified, baseline_m(*projections))
+            self.calibration = CameraCalibration.of(projections[0], rectified, baseline_m(*projections))
         self._cameras = left, right
         self._rectifications = [
             Rectification(cv2.initUndistortRectifyMap(each.matrix, _NO_LENS, turn, p, left.size_px, cv2.CV_32FC1))

@@ -13,7 +13,7 @@ from semgrid_eval.errors import InputError
 from semgrid_eval.files import read_bytes
 
 MAX_FILE_BYTES = 1 << 30
-_MAX_STAMP_NS = (1 << 63) - 1
+MAX_STAMP_NS = (1 << 63) - 1
 Table = dict[str, NDArray[Any]]
 
 
@@ -41,6 +41,6 @@ def _column(table: Any, name: str, kind: str, path: Path) -> NDArray[Any]:  # no
     values: NDArray[Any] = column.to_numpy(zero_copy_only=False)
     if kind == "float64" and len(wrong := np.flatnonzero(~np.isfinite(values))):
         raise InputError(f"row {wrong[0]}: {values[wrong[0]]} is not finite", path=path, field=name)
-    if name == "timestamp_ns" and len(wrong := np.flatnonzero((values < 0) | (values >= _MAX_STAMP_NS))):
+    if name == "timestamp_ns" and len(wrong := np.flatnonzero((values < 0) | (values >= MAX_STAMP_NS))):
         raise InputError(f"row {wrong[0]}: {values[wrong[0]]} ns is not a time", path=path, field=name)
     return values

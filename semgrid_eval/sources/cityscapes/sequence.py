@@ -8,6 +8,7 @@ from pathlib import Path
 
 from semgrid_eval.errors import InputError
 from semgrid_eval.files import digest_files, digest_value
+from semgrid_eval.recording.colour import ImageSize
 from semgrid_eval.recording.png import PngHeader
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame, Moment, Recording
 from semgrid_eval.sources.cityscapes import files
@@ -135,5 +136,5 @@ def sibling(image: Path, channel: str, suffix: str) -> Path:
 
 def _require_size(path: Path, header: PngHeader, first: PngHeader) -> None:
     if header[:2] != first[:2]:
-        began = f"{first.width} x {first.height}"
-        raise InputError(f"is {header.width} x {header.height}, but the sequence began with {began}", path=path)
+        found, began = (ImageSize(*each[:2]) for each in (header, first))
+        raise InputError(f"is {found}, but the sequence began with {began}", path=path)

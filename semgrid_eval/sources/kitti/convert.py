@@ -9,6 +9,7 @@ SRC/sequences/<NN>/image_2, image_3     rectified colour images, left and right;
 """
 
 import re
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from semgrid_eval.sources.parts import count_of_parts, equal_parts
 
 _LEAST_FRAMES = 2
 _NUMBER = re.compile(r"[0-9]{6}")
+_LEFT_MISSING = "right images (image_3) without left ones (image_2)"
 
 
 def convert_kitti(options: KittiOptions, out: Path, work: Work = IN_PROCESS) -> ConversionSummary:
@@ -62,7 +64,8 @@ def _sequence(folder: Path, options: KittiOptions) -> KittiSequence:
     channels += ["image_2"] * bool(left) + ["image_3"] * bool(left and right)
     numbers = scans or (left if right else [])
     if not numbers:
-        raise InputError("holds neither scans nor pairs of images", path=folder)
+        fault = f"holds {_LEFT_MISSING}, and no scans" if right else "holds neither scans nor pairs of images"
+        raise InputError(fault, path=folder)
     own = folder / "poses.txt"
     other = options.src / "poses" / f"{folder.name}.txt"
     poses = other if other.is_file() and not own.is_file() else own
@@ -87,18 +90,22 @@ def _parts(sequence: KittiSequence, options: KittiOptions) -> Iterator[Part]:
 
 def _remark(sequences: list[KittiSequence], out: Path) -> str:
     """Say in one line what is not there."""
-
-    def those(has: str = "", lacks: str = "") -> str:
-        """Name the sequences that have one channel and lack another."""
-        chosen = (each for each in sequences if has in ("", *each.channels) and lacks not in each.channels)
-        return ", ".join(each.folder.name for each in chosen)
-
-    told = {
-        "scans without labels, which a camera has to colour": those("velodyne", lacks="labels"),
-        "no images, so no camera": those(lacks="image_2"),
-        "no right images, so no disparity": those("image_2", lacks="image_3"),
-    }
-    parts = [f"{what}: {names}" for what, names in told.items() if names]
-    if seen := those("image_2"):
-        parts.append(f"no labels for the cameras of {seen}: {how_to_label(out)}")
+    names = defaultdict(list)
+    for sequence in sequences:
+        for what in _lacks(sequence):
+            names[what].append(sequence.folder.name)
+    parts = [f"{what}: {', '.join(found)}" for what, found in names.items()]
+    if seen := [each.folder.name for each in sequences if "image_2" in each.channels]:
+        parts.append(f"no labels for the cameras of {', '.join(seen)}: {how_to_label(out)}")
     return "; ".join(parts)
+
+
+def _lacks(sequence: KittiSequence) -> Iterator[str]:
+    """Name what a sequence lacks, but for labels of images, which none has."""
+    if "velodyne" in sequence.channels and "labels" not in sequence.channels:
+        yield "scans without labels, which a camera has to colour"
+    if "image_2" not in sequence.channels:
+        alone = _numbers(sequence.folder, "image_3")
+        yield f"{_LEFT_MISSING}, so no camera" if alone else "no images, so no camera"
+    elif "image_3" not in sequence.channels:
+        yield "no right images, so no disparity"

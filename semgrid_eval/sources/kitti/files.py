@@ -24,23 +24,38 @@ Floats = NDArray[np.float64]
 class Calibration:
     """What `calib.txt` says; frames are optical (right, down, forward), camera 0 the left grey one."""
 
-    left: Floats  # (3, 4) projection from camera 0 to the left colour image, P2
-    right: Floats  # (3, 4) to the right colour image, P3
-    camera_from_lidar: SE3 | None  # from the scanner to camera 0, Tr; None where the file does not say
+    path: Path
+    matrices: dict[str, Floats]  # (3, 4) each, by name
+
+    @property
+    def left(self) -> Floats:
+        """The projection from camera 0 to the left colour image."""
+        return self._matrix("P2")
+
+    @property
+    def right(self) -> Floats:
+        """The projection from camera 0 to the right colour image."""
+        return self._matrix("P3")
+
+    @property
+    def camera_from_lidar(self) -> SE3:
+        """From the scanner to camera 0."""
+        return _rigid(self._matrix("Tr"), self.path, "Tr")
+
+    def _matrix(self, name: str) -> Floats:
+        if name not in self.matrices:
+            raise InputError("is missing", path=self.path, field=name)
+        return self.matrices[name]
 
 
 def read_calibration(path: Path) -> Calibration:
-    """Read `calib.txt`."""
+    """Read `calib.txt`; what it lacks is an InputError where it is asked for."""
     found = {}
     for line in _lines(path):
         name, _, numbers = line.partition(":")
         if name in ("P2", "P3", "Tr"):
             found[name] = _numbers(numbers, 12, path, name).reshape(3, 4)
-    for name in ("P2", "P3"):
-        if name not in found:
-            raise InputError("is missing", path=path, field=name)
-    lidar = None if "Tr" not in found else _rigid(found["Tr"], path, "Tr")
-    return Calibration(found["P2"], found["P3"], lidar)
+    return Calibration(path, found)
 
 
 def read_times_ns(path: Path) -> NDArray[np.int64]:

@@ -11,7 +11,7 @@ from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
 from semgrid_eval.recording.lidar import LidarSweep, Mount
 from semgrid_eval.recording.types import CameraCalibration, Moment, Pose, Recording
 from semgrid_eval.sources.kitti import files
-from semgrid_eval.sources.kitti.stereo import LeftCamera, calibration_of
+from semgrid_eval.sources.kitti.stereo import LeftCamera, left_camera
 from semgrid_eval.sources.poses import motion_of, planar
 from semgrid_eval.words import plural
 
@@ -127,11 +127,11 @@ class Part:
         sequence = self.sequence
         poses = sequence.vehicle_poses
         motion = motion_of(poses)
-        left_camera = {name: LeftCamera(calibration) for name, calibration in self._cameras().items()}
+        left_cameras = {name: LeftCamera(calibration) for name, calibration in self._cameras().items()}
         for number in range(self.first, self.end):
             stamp_ns = sequence.stamps_ns[number]
             left, right = (sequence.file(channel, number) for channel in ("image_2", "image_3"))
-            cameras = {name: each.frame(stamp_ns, left, right) for name, each in left_camera.items()}
+            cameras = {name: each.frame(stamp_ns, left, right) for name, each in left_cameras.items()}
             sweeps = {LIDAR: self._sweep(number)} if "velodyne" in sequence.channels else {}
             yield Moment(stamp_ns, cameras, (motion[number],), poses[number], sweeps=sweeps)
 
@@ -139,14 +139,8 @@ class Part:
         sequence = self.sequence
         if "image_2" not in sequence.channels:
             return {}
-        calibration_file = sequence.folder / "calib.txt"
-        known = calibration_of(
-            sequence.calibration,
-            sequence.ego_from_camera0,
-            calibration_file,
-            with_disparity="image_3" in sequence.channels,
-        )
-        return {CAMERA: known}
+        with_disparity = "image_3" in sequence.channels
+        return {CAMERA: left_camera(sequence.calibration, sequence.ego_from_camera0, with_disparity=with_disparity)}
 
     def _sweep(self, number: int) -> LidarSweep:
         sequence = self.sequence
@@ -158,9 +152,6 @@ class Part:
                 f"has {plural(len(labels), 'label')}, but {scan.name} has {plural(len(points), 'point')}",
                 path=label_file,
             )
-        camera_from_lidar = sequence.calibration.camera_from_lidar
-        if camera_from_lidar is None:
-            raise InputError("is missing", path=sequence.folder / "calib.txt", field="Tr")
-        mount = Mount.of(sequence.ego_from_camera0 @ camera_from_lidar)
+        mount = Mount.of(sequence.ego_from_camera0 @ sequence.calibration.camera_from_lidar)
         with located(path=scan):
             return LidarSweep(sequence.stamps_ns[number], mount, points[:, :3], points[:, 3], labels)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError, located
+from semgrid_eval.recording.colour import ImageSize
 from semgrid_eval.recording.disparity import LARGEST_PX, coded_disparity
 from semgrid_eval.recording.png import encode, encode_gray
 from semgrid_eval.recording.types import CameraCalibration, CameraFrame
@@ -143,10 +144,9 @@ def _place(camera: CameraMap, vehicle: VehicleMap, facts: Facts) -> Extrinsics:
 
 
 def _require_size(facts: Facts, topic: str, info: Info, told_by: str | None) -> None:
-    shape = facts.shapes[topic]
-    if (shape.width, shape.height) != (info.width, info.height):
-        message = f"is {shape.width} x {shape.height}, but {told_by} calibrates {info.width} x {info.height}"
-        raise InputError(message, field=topic)
+    found, known = (ImageSize(each.width, each.height) for each in (facts.shapes[topic], info))
+    if found != known:
+        raise InputError(f"is {found}, but {told_by} calibrates {known}", field=topic)
 
 
 def _require_agreement(facts: Facts, topic: str, calibration: CameraCalibration) -> None:

@@ -167,9 +167,17 @@ FAULTS = {
     ),
     "no calibration": (
         lambda folder: (folder / "calibration/intrinsics.feather").unlink(),
-        "calibration/intrinsics.feather: is missing",
+        "calibration/intrinsics.feather: is missing (--ring-every 0 leaves images out)",
     ),
 }
+
+
+def test_without_calibration_of_both_kinds_of_cameras_both_options_are_told(tmp_path):
+    folder = write_argoverse(tmp_path / "src", ring=True, stereo=True)
+    path = folder / "calibration" / "egovehicle_SE3_sensor.feather"
+    path.unlink()
+    summary = convert_argoverse(ArgoverseOptions(src=tmp_path / "src"), tmp_path / "logs")
+    assert list(summary.failed.values()) == [f"{path}: is missing (--stereo-every 0 --ring-every 0 leaves images out)"]
 
 
 @pytest.mark.parametrize("name", FAULTS)

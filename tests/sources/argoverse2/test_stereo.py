@@ -123,6 +123,26 @@ def test_an_image_alone_and_those_beyond_the_boxes_are_left_out(folder, tmp_path
         first = min((images / name).iterdir())
         first.rename(first.with_name(f"{START_NS - 1}.jpg"))
     assert [each.stamp_ns for each in frames(tmp_path, stereo_every=1)[1]] == STAMPS_NS[2:]
+    remark = converted(tmp_path, stereo_every=1).remark
+    assert remark.startswith("left out: 2 images outside the boxes' times, 1 image without a partner; no labels")
+
+
+def test_a_lost_partner_leaves_the_longest_part_without_a_hole(folder, tmp_path):
+    sorted((folder / "sensors" / "cameras" / RIGHT).iterdir())[1].unlink()
+    assert [each.stamp_ns for each in frames(tmp_path)[1]] == STAMPS_NS[::2], "it is not one of those taken"
+    assert [each.stamp_ns for each in frames(tmp_path, stereo_every=1)[1]] == STAMPS_NS[2:]
+    remark = converted(tmp_path, stereo_every=1).remark
+    assert remark.startswith("left out: 1 image without a partner, 2 images before or after a hole; no labels")
+
+
+def test_images_after_the_last_box_alone_are_no_camera(folder, tmp_path):
+    for name in (LEFT, RIGHT):
+        for path in sorted((folder / "sensors" / "cameras" / name).iterdir()):
+            path.rename(path.with_name(f"{int(path.stem) + 10**9}.jpg"))
+    summary = converted(tmp_path)
+    assert summary.written == ["val/drive"]
+    assert summary.remark == "left out: 8 images outside the boxes' times"
+    assert frames(tmp_path)[0] == ()
 
 
 def no_right(folder):
@@ -169,7 +189,10 @@ FAULTS = {
         f"{IMAGES}/{LEFT}/{STAMPS_NS[0]}.jpg: is 200 x 100, but intrinsics.feather calibrates 512 x 388",
     ),
     "cut": (cut, f"{IMAGES}/{LEFT}/{STAMPS_NS[0]}.jpg: is a damaged JPEG file: ..."),
-    "no calibration": (lambda folder: (folder / INTRINSICS).unlink(), f"{INTRINSICS}: is missing"),
+    "no calibration": (
+        lambda folder: (folder / INTRINSICS).unlink(),
+        f"{INTRINSICS}: is missing (--stereo-every 0 leaves images out)",
+    ),
     "no camera": (
         with_intrinsics(lambda table: table["sensor_name"].__setitem__(1, "ring_front_left")),
         f"{INTRINSICS}: sensor_name: has 0 rows of {RIGHT}; one is needed (--stereo-every 0 leaves images out)",

@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from support.kitti_tree import BASELINE_M, CAMERA0_M, FOCAL_PX, SCANNER_M, STEP_NS, Sequence
+from support.kitti_tree import BASELINE_M, CAMERA0_M, FOCAL_PX, SCANNER_M, STEP_NS, Sequence, calibration_text
 
 from semgrid_eval.cli.main import cli
 from semgrid_eval.labels import LABEL_ID
@@ -96,7 +96,51 @@ def test_left_images_alone_are_a_camera_without_disparity(tmp_path):
 def test_right_images_alone_are_no_camera(tmp_path):
     folder = Sequence(images=True).write(tmp_path / "src")
     shutil.rmtree(folder / "image_2")
-    assert converted(tmp_path).remark == "no images, so no camera: 03"
+    told = "right images (image_3) without left ones (image_2)"
+    assert converted(tmp_path).remark == f"{told}, so no camera: 03"
+    shutil.rmtree(folder / "velodyne")
+    summary = convert_kitti(KittiOptions(src=tmp_path / "src"), tmp_path / "logs")
+    assert list(summary.failed.values()) == [f"{folder}: holds {told}, and no scans"]
+
+
+def test_the_remark_names_the_sequences_that_lack_each_thing(tmp_path):
+    Sequence().write(tmp_path / "src", "03")
+    Sequence(labels=None).write(tmp_path / "src", "04")
+    Sequence(images=True).write(tmp_path / "src", "05")
+    remark = converted(tmp_path).remark
+    assert remark.startswith(
+        "no images, so no camera: 03, 04; scans without labels, which a camera has to colour: 04; "
+        "no labels for the cameras of 05: add them"
+    )
+
+
+def keep_calibration(folder, *names):
+    """Leave the others out of the calibration file."""
+    path = folder / "calib.txt"
+    path.write_text("".join(line for line in path.read_text().splitlines(True) if line.startswith(names)))
+
+
+@pytest.mark.parametrize(
+    ("channels", "needed"),
+    [
+        (("velodyne",), ("Tr",)),
+        (("velodyne", "image_2"), ("Tr", "P2")),
+        (("image_2", "image_3"), ("P2", "P3")),
+    ],
+)
+def test_of_the_calibration_only_what_is_used_is_needed(tmp_path, channels, needed):
+    folder = Sequence(images=True, frames=2).write(tmp_path / "src")
+    for name in {"velodyne", "image_2", "image_3"}.difference(channels):
+        shutil.rmtree(folder / name)
+    keep_calibration(folder, *needed)
+    assert converted(tmp_path).written == ["val/03_000000"]
+    for name in needed:
+        keep_calibration(folder, *(other for other in needed if other != name))
+        summary = convert_kitti(KittiOptions(src=tmp_path / "src"), tmp_path / "logs")
+        (found,) = summary.failed.values()
+        assert found.startswith(f"{folder}/calib.txt: {name}: is missing")
+        (folder / "calib.txt").write_text(calibration_text())
+        keep_calibration(folder, *needed)
 
 
 def test_left_images_without_scans_are_refused(tmp_path):
@@ -199,7 +243,6 @@ FAULTS = {
         "times.txt: line 3: is not after the line before",
     ),
     "no scanner": (lambda s: lines(s / "calib.txt", 4), "calib.txt: Tr: is missing"),
-    "no projection": (lambda s: lines(s / "calib.txt", 3), "calib.txt: P3: is missing"),
     "binary": (lambda s: (s / "times.txt").write_bytes(b"\xff"), "times.txt: is not a text file"),
 }
 

@@ -67,6 +67,20 @@ def _gone(words: str, name: str) -> Bad:
     return Bad(words, KITTI, spoil=lambda: (FOLDER / name).unlink())
 
 
+def _images_alone(channel: str) -> None:
+    """Leave only images of one side, and of the calibration what places the scanner."""
+    rmtree(FOLDER)
+    Sequence(images=True).write(Path("KITTI"))
+    rmtree(FOLDER / ("image_3" if channel == "image_2" else "image_2"))
+    calibration = FOLDER / "calib.txt"
+    calibration.write_text(calibration.read_text().splitlines()[-1])
+
+
+def _right_images_alone() -> None:
+    _images_alone("image_3")
+    rmtree(FOLDER / "velodyne")
+
+
 def _table(words: str, path: Path, make: Callable[[], dict[str, list[Any]]], change: Callable[..., object]) -> Bad:
     def spoil() -> None:
         table = make()
@@ -101,6 +115,8 @@ DRIVES = Kind(
         _file("a point that is not a number", "velodyne/000001.bin", _points((1, np.nan, 0, 0), (1, 2, 3, 0))),
         _gone("a lost scan", "velodyne/000002.bin"),
         _gone("no poses", "poses.txt"),
+        Bad("right images without left ones, and no scans", KITTI, spoil=_right_images_alone),
+        Bad("a camera that is not calibrated", KITTI, spoil=lambda: _images_alone("image_2")),
         _table("a box that is not a number", BOXES, columns, _cell("tx_m", float("nan"))),
         _table("a box of an unknown category", BOXES, columns, _cell("category", "TANK")),
         _table("boxes without poses", POSES, lambda: pose_columns(3), lambda table: None),
