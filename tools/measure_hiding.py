@@ -20,10 +20,12 @@ from numpy.typing import NDArray
 
 from semgrid_eval.errors import SemgridError
 from semgrid_eval.geometry import SE3
+from semgrid_eval.recording.types import CameraCalibration
 from semgrid_eval.sensors.colouring import PointPixels, reach_px
 from semgrid_eval.sensors.projection import unit_projection
-from semgrid_eval.sources.argoverse2.cameras import calibration_of, read_camera
+from semgrid_eval.sources.argoverse2.cameras import read_camera
 from semgrid_eval.sources.argoverse2.drive import Drive
+from semgrid_eval.sources.argoverse2.taken import Every
 from semgrid_eval.sources.argoverse2.tracks import read_boxes, transform
 from semgrid_eval.sources.argoverse2.vehicle import EGO_FROM_ARGOVERSE
 
@@ -74,7 +76,7 @@ def boxes_at(log: Path) -> dict[int, list[Box]]:
 
 def sweeps_of(log: Path) -> Iterator[tuple[int, Floats]]:
     """Yield time and points (N, 3) in the vehicle frame of each sweep."""
-    for moment in Drive(log, log.parent.name, stereo_every=0, ring_every=0).recording().moments():
+    for moment in Drive(log, log.parent.name, Every(0, 0)).recording().moments():
         for sweep in moment.sweeps.values():
             yield moment.stamp_ns, sweep.mount.ego_from_sensor.apply(sweep.points_m.astype(np.float64))
 
@@ -82,7 +84,7 @@ def sweeps_of(log: Path) -> Iterator[tuple[int, Floats]]:
 def counted(log: Path, name: str) -> NDArray[np.int64]:
     """Count points of a camera: scale, angle; all, behind a vehicle, other ground; hidden, and all of them."""
     camera = read_camera(log, name, "--ring-every")
-    calibration = calibration_of(camera.matrix, camera.ego_from_optical, None)
+    calibration = CameraCalibration.of(camera.matrix, camera.ego_from_optical, None)
     projection = unit_projection(calibration, camera.size_px)
     eye_m, boxes = camera.ego_from_optical.translation_m, boxes_at(log)
     found = np.zeros((len(SCALES), len(ANGLES_RAD), 3, 2), np.int64)
