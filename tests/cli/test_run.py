@@ -1,11 +1,11 @@
 import re
 import shlex
-from dataclasses import replace
 
 import pytest
 import yaml
 from click.testing import CliRunner
 from support.toy_world import street
+from support.unlabelled import unlabelled
 
 from semgrid_eval.cli.main import cli, main
 from semgrid_eval.log.store import write_log
@@ -121,15 +121,6 @@ class NotANumber(Model):
     def predict(self, batch):
         return torch.full((len(batch.target), 10, 128, 128), torch.nan)
 """
-
-
-def unlabelled(recording):
-    def moments():
-        for moment in recording.moments():
-            cameras = {name: replace(frame, label_png=None) for name, frame in moment.cameras.items()}
-            yield replace(moment, cameras=cameras)
-
-    return replace(recording, moments=moments)
 
 
 @pytest.mark.slow

@@ -1,6 +1,5 @@
 """A bag of two single cameras and a LiDAR without labels, from the bag to a report."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from support.commands import run_command
 from support.rig_bags import Coding, RigBag
 from support.single import single_rig
 from support.toy_world import START_NS
+from support.unlabelled import unlabelled
 
 from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.config import parse_config
@@ -37,15 +37,6 @@ def ran(line):
     ended = run_command(line.split())
     assert ended.code == 0, f"{line}\n{ended.err}"
     return ended.err
-
-
-def unlabelled(recording):
-    def moments():
-        for moment in recording.moments():
-            cameras = {name: replace(frame, label_png=None) for name, frame in moment.cameras.items()}
-            yield replace(moment, cameras=cameras)
-
-    return replace(recording, moments=moments)
 
 
 @pytest.fixture
