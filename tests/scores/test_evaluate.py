@@ -63,7 +63,12 @@ def test_class_and_certainty_are_those_of_the_largest_score_in_each_cell():
 
 @pytest.mark.parametrize(
     ("value", "message"),
-    [(torch.nan, "NaN or infinite"), (torch.inf, "NaN or infinite"), (1.2, "from 1 to 1.2, and scores go from 0 to 1")],
+    [
+        (torch.nan, "NaN or infinite"),
+        (torch.inf, "NaN or infinite"),
+        (-torch.inf, "NaN or infinite"),
+        (1.2, "from 1 to 1.2, and scores go from 0 to 1"),
+    ],
 )
 def test_no_answer_is_scored_that_is_not_scores_whoever_gives_it(value, message):
     class Fixed(Model):

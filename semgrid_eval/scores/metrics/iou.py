@@ -73,7 +73,7 @@ class Iou(Metric):
     def count(self, scored: ScoredWindows, regions: Regions) -> Counts:
         """Count cells by target and predicted class: -> (N, regions, C, C)."""
         count = self.classes.count
-        codes = scored.target.astype(np.int64) * count + scored.prediction
+        codes = scored.target.astype(np.int32) * count + scored.prediction
         return regions.tally(codes, count**2).reshape(len(codes), regions.count, *self.shape)
 
     def ratios(self, sums: Counts) -> Counts:
@@ -119,8 +119,8 @@ def confusion(
         raise ValueError(f"shapes differ: {target.shape}, {prediction.shape}, {mask.shape}")
     if max(target.max(initial=0), prediction.max(initial=0)) >= classes:
         raise ValueError(f"class ids must be below {classes}")
-    codes = target.astype(np.int64) * classes + prediction
-    return Regions(np.where(mask, -1, 0), 1).tally(codes, classes**2).reshape(-1, classes, classes)
+    codes = target.astype(np.int32) * classes + prediction
+    return Regions(-mask.view(np.int8), 1).tally(codes, classes**2).reshape(-1, classes, classes)
 
 
 def class_iou(counts: Counts) -> Floats:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,20 +38,34 @@ class ScoredWindows:
 class Regions:
     """In which region each cell counts: `number` (N, H, W) from 0 to below `count`, -1 where it counts nowhere."""
 
-    number: NDArray[np.int64]
+    number: NDArray[np.integer]
     count: int
 
     def tally(self, codes: NDArray[np.integer], size: int) -> Counts:
         """Count cells by their code in each window and region: (N, H, W) below `size` -> (N, count, size).
 
         Cells with a negative code are left out.
+
+        Raises:
+            IndexError: a region or a code is too large.
         """
-        windows = len(codes)
-        counted = (self.number >= 0) & (codes >= 0)
-        place = np.arange(windows)[:, None, None] * self.count + self.number
-        index = (place * size + codes)[counted]
-        total = np.bincount(index, minlength=windows * self.count * size)
-        return np.asarray(total.reshape(windows, self.count, size), np.int64)
+        total = np.zeros((len(codes), self.count, size), np.int64)
+        _tally(self.number, codes, total)
+        return total
+
+
+@numba.njit(cache=True, nogil=True)
+def _tally(region, code, total):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    windows, rows, columns = region.shape
+    for window in range(windows):
+        for row in range(rows):
+            for column in range(columns):
+                where, what = region[window, row, column], code[window, row, column]
+                if where < 0 or what < 0:
+                    continue
+                if where >= total.shape[1] or what >= total.shape[2]:
+                    raise IndexError("a region or a code is too large")
+                total[window, where, what] += 1
 
 
 @dataclass(frozen=True)
