@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.bench.material import Material, pictures_of
+from semgrid_eval.bench.material import Material, PictureSize, pictures_of
 from semgrid_eval.bench.measurement import Measurement, Settings, seconds_passed, times_as_fast, wall_s
 from semgrid_eval.bench.rivals import View, confusion_by_definition, decode_by_opencv, grid_by_arrays
 from semgrid_eval.classes import CLASS_COUNT
@@ -31,16 +31,10 @@ SCORED_WINDOWS = 500
 
 
 def measure_grids(material: Material) -> Iterator[Measurement]:
-    """Make the grids of a log, of the whole image alone and with the crops of both splits; and those of many logs."""
-    settings, whole = material.settings, GridConfig(sensors={"full": CameraSensor()})
-    decode = partial(decode_by_opencv, pictures_of(material.log, (DISPARITY, LABEL)))
-    for config in (whole, GridConfig()):
-        make = partial(build_log, material.log, config)
-        make()  # compiles
-        what = f"grids of {plural(len(config.sensors), 'sensor')}"
-        yield Measurement(what, FRAME_COUNT / wall_s(make, settings.repeats), "frames/s")
-        taken = 1.0 / times_as_fast(make, decode, settings.repeats)
-        yield Measurement(f"{what}, against decoding by OpenCV", taken, "times its time")
+    """Make the grids of logs, of the whole image alone and with the crops of both splits; and those of many logs."""
+    settings = material.settings
+    for size_px in settings.pictures_px:
+        yield from _measure_log(material, size_px)
     alone, together = (partial(_build_anew, material, workers) for workers in (1, settings.workers))
     gain = times_as_fast(together, alone, settings.repeats, clock=seconds_passed)
     yield Measurement(
@@ -51,10 +45,22 @@ def measure_grids(material: Material) -> Iterator[Measurement]:
     )
 
 
+def _measure_log(material: Material, size_px: PictureSize) -> Iterator[Measurement]:
+    log, repeats = material.log(size_px), material.settings.repeats
+    decode = partial(decode_by_opencv, pictures_of(log, (DISPARITY, LABEL)))
+    for config in (GridConfig(sensors={"full": CameraSensor()}), GridConfig()):
+        make = partial(build_log, log, config)
+        make()  # compiles
+        what = f"grids of {plural(len(config.sensors), 'sensor')}, {size_px[0]} x {size_px[1]}"
+        yield Measurement(what, FRAME_COUNT / wall_s(make, repeats), "frames/s")
+        taken = 1.0 / times_as_fast(make, decode, repeats)
+        yield Measurement(f"{what}, against decoding by OpenCV", taken, "times its time")
+
+
 def measure_cells(material: Material) -> Iterator[Measurement]:
     """Project a frame's pixels and draw its grid, against plain NumPy, which gives the same grid."""
     config = GridConfig(sensors={"full": CameraSensor()})
-    with LogReader(material.log) as log:
+    with LogReader(material.log(material.smallest_px)) as log:
         (camera,) = log.scene.cameras
         frame, calibration = next(iter(log.frames(camera))), log.calibration(camera)
     disparity = decode_gray(frame.disparity_png or b"", bit_depth=16)

@@ -53,8 +53,9 @@ def measure_town(material: Material) -> Iterator[Measurement]:
 
 def measure_rendering(material: Material) -> Iterator[Measurement]:
     """Render a recording with each kind of stereo."""
+    scale = material.settings.scale
     for stereo, width_px, height_px, at_most_s in _RENDERED:
-        plan = material.plan(stereo, width_px, height_px)
+        plan = material.plan(stereo, round(width_px * scale), round(height_px * scale))
         _render(replace(plan, width_px=64, height_px=32))  # loads and compiles what the first rendering needs
         with _one_thread():
             seconds = processor_s(partial(_render, plan), material.settings.repeats)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from semgrid_eval.bench.material import Material, pictures_of
+from semgrid_eval.bench.material import Material, PictureSize, pictures_of
 from semgrid_eval.bench.measurement import Measurement, seconds_passed, times_as_fast, wall_s
 from semgrid_eval.bench.rivals import decode_by_opencv, read_by_library
 from semgrid_eval.log.check import check_log
@@ -34,11 +34,16 @@ def measure_conversion(material: Material) -> Iterator[Measurement]:
 
 
 def measure_logs(material: Material) -> Iterator[Measurement]:
-    """Write a log from frames in memory, read all of it and check it; against decoding, and the MCAP library."""
-    repeats, path, written = material.settings.repeats, material.log, material.folder / "written.mcap"
-    megabytes = path.stat().st_size / _MEGABYTE
-    looked_through = replace(material.recording, encoded_here=False)  # as if others had made its pictures
-    write, read, check = partial(write_log, material.recording, written), partial(_read, path), partial(check_log, path)
+    """Write logs from frames in memory, read all of them and check them; against decoding, and the MCAP library."""
+    for size_px in material.settings.pictures_px:
+        yield from _measure_log(material, size_px)
+
+
+def _measure_log(material: Material, size_px: PictureSize) -> Iterator[Measurement]:
+    repeats, path, written = material.settings.repeats, material.log(size_px), material.folder / "written.mcap"
+    megabytes, recording = path.stat().st_size / _MEGABYTE, material.recording(size_px)
+    looked_through = replace(recording, encoded_here=False)  # as if others had made its pictures
+    write, read, check = partial(write_log, recording, written), partial(_read, path), partial(check_log, path)
     library = partial(read_by_library, path)
     decode = partial(decode_by_opencv, pictures_of(path, PICTURE_FIELDS))
     rates: tuple[tuple[str, Callable[[], object], float | None], ...] = (
@@ -47,13 +52,12 @@ def measure_logs(material: Material) -> Iterator[Measurement]:
         ("read", read, 600.0),
         ("checked", check, None),
     )
+    log = f"log of {megabytes:.1f} MB, {size_px[0]} x {size_px[1]}"
     for what, work, at_least in rates:
-        rate = megabytes / wall_s(work, repeats)
-        yield Measurement(f"log of {megabytes:.1f} MB {what}", rate, "MB/s", at_least=at_least)
-    yield Measurement("read, against the MCAP library", times_as_fast(read, library, repeats), "times")
-    yield Measurement(
-        "checked, against decoding by OpenCV", times_as_fast(check, decode, repeats), "times", at_least=1.0
-    )
+        yield Measurement(f"{log}, {what}", megabytes / wall_s(work, repeats), "MB/s", at_least=at_least)
+    yield Measurement(f"{log}, read, against the MCAP library", times_as_fast(read, library, repeats), "times")
+    gain = times_as_fast(check, decode, repeats)
+    yield Measurement(f"{log}, checked, against decoding by OpenCV", gain, "times", at_least=1.0)
 
 
 def _convert_anew(tree: Path, folder: Path, *, workers: int = 1) -> None:

@@ -17,6 +17,8 @@ from semgrid_eval.sources.town.config import SyntheticConfig
 from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
 
+PictureSize = tuple[int, int]
+"""Width and height."""
 _CITY, _CAMERA = "benchtown", "front"
 
 
@@ -25,50 +27,54 @@ class Material:
 
     def __init__(self, folder: Path, settings: Settings) -> None:
         self.folder, self.settings = folder, settings
+        self.smallest_px = settings.pictures_px[0]
+        self._recordings: dict[PictureSize, Recording] = {}
 
     def plan(self, stereo: Stereo, width_px: int, height_px: int) -> RecordingPlan:
-        """Plan a recording in the town, which is built once; the size is scaled as the settings say."""
-        scale = self.settings.scale
+        """Plan a recording in the town, which is built once."""
         config = SyntheticConfig(
             recordings=1,
             towns=1,
             val_share=0.0,
             stereo=stereo,
-            width=round(width_px * scale),
-            height=round(height_px * scale),
+            width=width_px,
+            height=height_px,
             town_size_m=self.settings.town_size_m,
             duration_s=self.settings.duration_s,
         )
         return plan_recordings(config, self.folder / "towns", silent)[0]
 
-    @cached_property
-    def recording(self) -> Recording:
-        """A rendered recording of modelled stereo, its frames in memory."""
-        recording = render_recording(self.plan("modelled", 512, 256))
-        moments = tuple(recording.moments())
-        return replace(recording, moments=lambda: iter(moments))
+    def recording(self, size_px: PictureSize) -> Recording:
+        """Return a rendered recording of modelled stereo, its frames in memory; its log is made with it."""
+        if size_px not in self._recordings:
+            recording = render_recording(self.plan("modelled", *size_px))
+            moments = tuple(recording.moments())
+            self._recordings[size_px] = replace(recording, moments=lambda: iter(moments))
+            write_log(self._recordings[size_px], self._log_place(size_px))
+        return self._recordings[size_px]
 
-    @cached_property
-    def log(self) -> Path:
-        """The log of that recording."""
-        path = self.folder / "recording.mcap"
-        write_log(self.recording, path)
-        return path
+    def log(self, size_px: PictureSize) -> Path:
+        """Return the log of that recording."""
+        self.recording(size_px)
+        return self._log_place(size_px)
+
+    def _log_place(self, size_px: PictureSize) -> Path:
+        return self.folder / f"recording-{size_px[0]}.mcap"
 
     @cached_property
     def logs(self) -> list[Path]:
-        """As many logs of it as are shared by several workers: links to the one."""
+        """As many logs of the smallest pictures as are shared by several workers: links to the one."""
         links = [self.folder / f"recording-{number:03d}.mcap" for number in range(self.settings.recordings)]
         for link in links:
-            link.symlink_to(self.log)
+            link.symlink_to(self.log(self.smallest_px))
         return links
 
     @cached_property
     def tree(self) -> Path:
-        """As many recordings of it in Cityscapes' layout."""
+        """As many recordings of them in Cityscapes' layout."""
         root = self.folder / "tree"
         for sequence in range(self.settings.recordings):
-            _write_sequence(root, sequence, self.recording)
+            _write_sequence(root, sequence, self.recording(self.smallest_px))
         return root
 
 

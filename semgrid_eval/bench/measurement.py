@@ -14,18 +14,19 @@ class Settings:
     repeats: int = 3  # of each measurement; their median counts
     town_size_m: float = 450.0  # side of the town that is built
     duration_s: float = 90.0  # simulated time of it
-    scale: float = 1.0  # of the images' width and height
+    scale: float = 1.0  # of the width and height of what is rendered
     features: tuple[int, ...] = (16, 32, 64)  # of the encoder-decoders that are trained
     batch: int = 8  # windows of an update
     updates: int = 4  # in each repeat
     windows: int = 64  # that are predicted and scored in each repeat
     matrix_rows: int = 2048  # of the square matrices whose product tells the machine's rate
+    pictures_px: tuple[tuple[int, int], ...] = ((512, 256), (2048, 1024))  # sizes of a camera's pictures in logs
     recordings: int = 16  # whose conversion and grids are shared by `workers`
     workers: int = 2  # processes at once
 
 
 FULL = Settings()
-QUICK = Settings(repeats=1, features=(16,), updates=3, windows=32, recordings=4)
+QUICK = Settings(repeats=1, features=(16,), updates=3, windows=32, pictures_px=((512, 256),), recordings=4)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ TINY = Settings(
     town_size_m=250.0,
     duration_s=15.0,
     scale=0.125,
+    pictures_px=((64, 32), (128, 64)),
     features=(2,),
     batch=2,
     updates=1,
