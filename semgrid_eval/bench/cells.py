@@ -38,7 +38,7 @@ def measure_grids(material: Material) -> Iterator[Measurement]:
     alone, together = (partial(_build_anew, material, workers) for workers in (1, settings.workers))
     gain = times_as_fast(together, alone, settings.repeats, clock=seconds_passed)
     yield Measurement(
-        f"grids of {plural(settings.recordings, 'log')}, {plural(settings.workers, 'worker')}",
+        f"{plural(settings.recordings, 'log')}, {plural(settings.workers, 'worker')}",
         gain,
         "times",
         at_least=1.8,
@@ -51,10 +51,10 @@ def _measure_log(material: Material, size_px: PictureSize) -> Iterator[Measureme
     for config in (GridConfig(sensors={"full": CameraSensor()}), GridConfig()):
         make = partial(build_log, log, config)
         make()  # compiles
-        what = f"grids of {plural(len(config.sensors), 'sensor')}, {size_px[0]} x {size_px[1]}"
+        what = f"{size_px[0]} x {size_px[1]}, {plural(len(config.sensors), 'sensor')}"
         yield Measurement(what, FRAME_COUNT / wall_s(make, repeats), "frames/s")
         taken = 1.0 / times_as_fast(make, decode, repeats)
-        yield Measurement(f"{what}, against decoding by OpenCV", taken, "times its time")
+        yield Measurement(f"{what}, against decoding", taken, "times its time")
 
 
 def measure_cells(material: Material) -> Iterator[Measurement]:

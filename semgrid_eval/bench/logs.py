@@ -48,16 +48,16 @@ def _measure_log(material: Material, size_px: PictureSize) -> Iterator[Measureme
     decode = partial(decode_by_opencv, pictures_of(path, PICTURE_FIELDS))
     rates: tuple[tuple[str, Callable[[], object], float | None], ...] = (
         ("written", write, 400.0),
-        ("written, its pictures looked through", partial(write_log, looked_through, written), None),
+        ("written, pictures looked through", partial(write_log, looked_through, written), None),
         ("read", read, 600.0),
         ("checked", check, None),
     )
-    log = f"log of {megabytes:.1f} MB, {size_px[0]} x {size_px[1]}"
+    log = f"{size_px[0]} x {size_px[1]}, {megabytes:.1f} MB"
     for what, work, at_least in rates:
         yield Measurement(f"{log}, {what}", megabytes / wall_s(work, repeats), "MB/s", at_least=at_least)
     yield Measurement(f"{log}, read, against the MCAP library", times_as_fast(read, library, repeats), "times")
     gain = times_as_fast(check, decode, repeats)
-    yield Measurement(f"{log}, checked, against decoding by OpenCV", gain, "times", at_least=1.0)
+    yield Measurement(f"{log}, checked, against decoding", gain, "times", at_least=1.0)
 
 
 def _convert_anew(tree: Path, folder: Path, *, workers: int = 1) -> None:
