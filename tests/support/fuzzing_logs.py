@@ -3,6 +3,7 @@
 import io
 import json
 import random
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,26 +12,40 @@ from mcap.writer import Writer
 from support import damage
 from support.driving import driving
 from support.fuzzing_ways import Inputs, changed_bytes
+from support.single import single
+from support.swept import sweep
 
 from semgrid_eval.files import digest_value
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.recover import recover_log
 from semgrid_eval.log.store import write_log
-from semgrid_eval.recording.types import Quantity
+from semgrid_eval.recording.types import Moment, Quantity, Recording
 
 
 def log_inputs(folder: Path) -> dict[str, bytes]:
-    made = {}
-    for name, options in (
-        ("small", {"frames": 2, "size": (16, 8)}),
-        ("two", {"frames": 2, "cameras": ("front", "rear"), "size": (8, 8)}),
-        ("long", {"frames": 6, "size": (8, 8)}),
-    ):
-        recording = replace(driving(**options), conditions={"noise": Quantity(0.31, "px"), "count": Quantity(3, "")})
-        write_log(recording, folder / f"{name}.mcap")
-        made[f"{name}.mcap"] = (folder / f"{name}.mcap").read_bytes()
-    return made
+    two = driving(frames=2, cameras=("front", "rear"), size=(8, 8))
+    recordings = {
+        "small": driving(frames=2, size=(16, 8)),
+        "two": two,
+        "single": swept(single(two, "rear")),
+        "long": driving(frames=6, size=(8, 8)),
+    }
+    conditions = {"noise": Quantity(0.31, "px"), "count": Quantity(3, "")}
+    for name, recording in recordings.items():
+        write_log(replace(recording, conditions=conditions), folder / f"{name}.mcap")
+    return {f"{name}.mcap": (folder / f"{name}.mcap").read_bytes() for name in recordings}
+
+
+def swept(recording: Recording) -> Recording:
+    """Put a LiDAR beside the cameras, whose points are labelled."""
+
+    def moments() -> Iterator[Moment]:
+        for moment in recording.moments():
+            points = sweep(moment.stamp_ns, [(8.0, 1.0, -1.0), (20.0, -4.0, 0.5)], ["road", "car"])
+            yield replace(moment, sweeps={"top": points})
+
+    return replace(recording, moments=moments)
 
 
 def read_log(folder: Path, name: str) -> object:
@@ -44,7 +59,21 @@ def read_log(folder: Path, name: str) -> object:
             camera: (log.calibration(camera), list(log.frames(camera, images=True))) for camera in log.scene.cameras
         }
         told = (log.scene, log.conditions(), log.attachments(), log.motion(), log.poses(), list(log.actors()))
-        return told, cameras, list(log.moments()), report.good
+        return told, cameras, [comparable(moment) for moment in log.moments()], report.good
+
+
+def comparable(moment: Moment) -> tuple[Moment, list[object]]:
+    """Sweeps are equal if their arrays are."""
+    arrays = [
+        (
+            name,
+            each.stamp_ns,
+            each.mount,
+            *(array.tobytes() for array in (each.points_m, each.intensity, each.label_id)),
+        )
+        for name, each in sorted(moment.sweeps.items())
+    ]
+    return replace(moment, sweeps={}), arrays
 
 
 def log_agrees(whole: bytes, data: bytes, expected: object, found: object) -> bool:

@@ -18,7 +18,7 @@ _EVERY_PX, _FARTHEST_M = 3, 60.0
 
 
 def single(recording: Recording, *cameras: str) -> Recording:
-    """Take the disparity away from some cameras, or from all."""
+    """Take the disparity away from some cameras, or from all; a frame that then shows nothing goes with it."""
     names = cameras or tuple(recording.calibrations)
     calibrations = {
         name: replace(each, baseline_m=None) if name in names else each for name, each in recording.calibrations.items()
@@ -27,9 +27,13 @@ def single(recording: Recording, *cameras: str) -> Recording:
     def moments() -> Iterator[Moment]:
         for moment in recording.moments():
             frames = {name: _bare(each) if name in names else each for name, each in moment.cameras.items()}
-            yield replace(moment, cameras=frames)
+            yield replace(moment, cameras={name: each for name, each in frames.items() if _shows(each)})
 
     return replace(recording, calibrations=calibrations, moments=moments)
+
+
+def _shows(frame: CameraFrame) -> bool:
+    return any(each is not None for each in (frame.image_file, frame.label_png, frame.disparity_png))
 
 
 def _bare(frame: CameraFrame) -> CameraFrame:
