@@ -140,14 +140,14 @@ def _frame_values(frame: CameraFrame) -> Iterator[tuple[str, str, Extent]]:
 
 def _require_size(frame: CameraFrame, size: ImageSize | None) -> ImageSize:
     """Return the size of all pictures of a frame, that of the frames before if there were any."""
-    for channel, png in (("disparity", frame.disparity_png), ("label", frame.label_png), ("image", frame.image_file)):
-        if png is None:
-            continue
-        found = read_size(png)
-        size = size or found
-        if found != size:
-            raise InputError(f"is {found}, not {size}", field=channel)
-    assert size is not None
+    pictures = {"disparity": frame.disparity_png, "label": frame.label_png, "image": frame.image_file}
+    found = {channel: read_size(png) for channel, png in pictures.items() if png is not None}
+    if not found:
+        raise InputError("there is neither disparity nor image nor labels")
+    size = size or next(iter(found.values()))
+    for channel, each in found.items():
+        if each != size:
+            raise InputError(f"is {each}, not {size}", field=channel)
     return size
 
 

@@ -33,9 +33,10 @@ def cloud_inputs(folder: Path) -> dict[str, bytes]:
     """Write a bag of each storage and their maps; what is changed are the files that hold the messages."""
     found = {}
     for storage in ("mcap", "sqlite3"):
-        messages = messages_of(SWEPT.write(folder / storage, storage))
-        (folder / f"{storage}.yaml").write_text(MAP)
-        found[f"{storage}/{messages.name}"] = messages.read_bytes()
+        bag = SWEPT.write(folder / f"clouds-{storage}", storage)
+        bag.with_suffix(".yaml").write_text(MAP)
+        messages = messages_of(bag)
+        found[f"{bag.name}/{messages.name}"] = messages.read_bytes()
     return found
 
 

@@ -105,8 +105,8 @@ def _sealed(entries: dict[str, str]) -> dict[str, str]:
     return {**given, "digest": digest_value(given)} if "digest" in entries else given
 
 
-def _without(topic: str) -> Message:
-    return lambda name, data: None if name == topic else data
+def _without(*gone: str) -> Message:
+    return lambda topic, data: None if topic in gone else data
 
 
 def _broken(topic: str, data: bytes) -> Message:
@@ -144,6 +144,11 @@ def _unsealed() -> None:
     data = LOG.read_bytes()
     assert data.count(b"synthetic") == 1
     LOG.write_bytes(data.replace(b"synthetic", b"sYnthetic"))
+
+
+def _truth_alone() -> None:
+    write_log(single(_whole()), LOG)
+    again(_without(LABEL, topics.camera_topic("front", topics.IMAGE)))
 
 
 def _other_camera(folder: str) -> None:
@@ -193,6 +198,7 @@ KIND = Kind(
         _log("a run that `play` wrote", lambda: _other_kind(PLAYBACK_RECORD), "check logs"),
         _log("predictions", lambda: _other_kind(PREDICTIONS_RECORD)),
         _log("a label image of another size", lambda: _pictures(label_png=SMALL), "check logs"),
+        _log("a camera of which there is the truth alone", _truth_alone, "check logs"),
         _log("a disparity image of 8 bit", lambda: again(_png(DISPARITY, encode_gray(np.zeros((16, 32), np.uint8))))),
         _log("a label image that is cut", lambda: again(_png(LABEL, SMALL[:-20]))),
         _log("two cameras, none of them named", lambda: _other_camera("logs")),
