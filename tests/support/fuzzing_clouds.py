@@ -33,10 +33,10 @@ def cloud_inputs(folder: Path) -> dict[str, bytes]:
     """Write a bag of each storage and their maps; what is changed are the files that hold the messages."""
     found = {}
     for storage in ("mcap", "sqlite3"):
-        bag = SWEPT.write(folder / f"clouds-{storage}", storage)
+        bag = SWEPT.write(folder / "clouds" / storage, storage)
         bag.with_suffix(".yaml").write_text(MAP)
         messages = messages_of(bag)
-        found[f"{bag.name}/{messages.name}"] = messages.read_bytes()
+        found[str(messages.relative_to(folder))] = messages.read_bytes()
     return found
 
 
@@ -54,7 +54,7 @@ def changed_clouds(inputs: Inputs, name: str, chance: random.Random) -> bytes:
         for each in SWEPT.messages()
     ]
     with tempfile.TemporaryDirectory() as folder:
-        return messages_of(write_bag(Path(folder) / "bag", messages, Path(name).parts[0])).read_bytes()
+        return messages_of(write_bag(Path(folder) / "bag", messages, Path(name).parent.name)).read_bytes()
 
 
 def changed(cloud: Any, chance: random.Random) -> Any:

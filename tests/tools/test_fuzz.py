@@ -48,6 +48,12 @@ def test_nothing_is_found_in_a_short_run(fuzz, tmp_path, name):
     assert tally.outcomes["refused"] < COUNTS[name] or name in ("log", "recovery")  # some changes mean nothing
 
 
+def test_kinds_of_one_run_do_not_get_in_each_others_way(fuzz, tmp_path, capsys):
+    outcomes, failures = fuzz.run_kinds(COUNTS, 1, 600.0, tmp_path)
+    assert (outcomes.total(), failures) == (len(COUNTS), [])
+    assert len(capsys.readouterr().out.splitlines()) == len(COUNTS)
+
+
 def test_every_kind_that_a_run_keeps_is_fuzzed():
     assert KINDS.keys() == COUNTS.keys() | KEPT.keys()
 
