@@ -13,10 +13,11 @@ MOST_BYTES = 3_000_000
 
 def test_who_wins_by_how_much_and_how_sure_stands_on_the_first_screen(browser, reference_page):
     open_page(browser, reference_page, **SCREEN)
-    script = "return [...document.querySelectorAll('#summary .lead, #summary .tiles li, #summary > .hint')].map(e => " + (
+    shown = "#summary .lead, #summary .tiles li, #summary > .hint"
+    script = "return [...document.querySelectorAll(arguments[0])].map(e => " + (
         "[e.textContent.trim(), e.getBoundingClientRect().bottom])"
     )
-    parts = browser.execute_script(script)
+    parts = browser.execute_script(script, shown)
     assert max(bottom for _, bottom in parts) <= SCREEN["height"]
     text = " ".join(words for words, _ in parts)
     assert (
