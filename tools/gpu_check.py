@@ -29,9 +29,10 @@ from semgrid_eval.executors import Executor, InProcess, Processes, WorkerDied, a
 from semgrid_eval.files import read_json, write_json
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.device import choose_device, visible_gpus
+from semgrid_eval.presets import preset_names
 from semgrid_eval.progress import silent_stage
 from semgrid_eval.runs.data import RunData
-from semgrid_eval.runs.matrix import Matrix, preset_names
+from semgrid_eval.runs.matrix import Matrix
 from semgrid_eval.runs.packed import pack_grids
 from semgrid_eval.runs.record import machine, versions
 from semgrid_eval.runs.runner import RunOptions, run_matrix

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.shell_completion import CompletionItem
 
 from semgrid_eval.cli.console import command_line, complain, loudness_options, progress, say
 from semgrid_eval.cli.options import (
@@ -20,6 +21,7 @@ from semgrid_eval.cli.options import (
 )
 from semgrid_eval.cli.types import Number, Whole
 from semgrid_eval.errors import printable
+from semgrid_eval.presets import preset_names
 from semgrid_eval.words import plural
 from semgrid_eval.workplace import LOCAL
 
@@ -33,8 +35,14 @@ _ANY_MACHINE = "Take trainings of other machines, too: of a GPU, in another prec
 _MODEL = "One more row: a model of your own, path.py:Class, or an installed one."
 
 
+def _completed(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a preset, or else of a file."""
+    names = [name for name in preset_names() if name.startswith(incomplete)]
+    return [CompletionItem(name) for name in names] or [CompletionItem(incomplete, type="file")]
+
+
 @click.command("run", epilog="Example: semgrid-eval run baselines --logs logs --out runs/first")
-@click.argument("matrix")
+@click.argument("matrix", shell_complete=_completed)
 @click.option("--logs", required=True, type=THERE, help="Folder of MCAP logs.")
 @click.option("--out", required=True, type=FOLDER, help="Folder of the run.")
 @click.option("--grids", type=FOLDER, help="Grid cache (default: OUT/grids).")

@@ -17,6 +17,7 @@ from semgrid_eval.errors import ConfigError, InputError
 from semgrid_eval.faults import meant, not_one_of, shown
 from semgrid_eval.models.beside import require_defined, require_python
 from semgrid_eval.models.registry import is_named, model_names
+from semgrid_eval.presets import preset_names
 from semgrid_eval.runs.row import Row
 from semgrid_eval.words import plural
 
@@ -54,12 +55,6 @@ class _MatrixFile(Config):
     models: dict[str, dict[str, Any]] = Field(default_factory=dict)  # settings by model, under those of its rows
     defaults: dict[str, Any] = Field(default_factory=dict)
     rows: list[dict[str, Any]] = Field(default_factory=list)
-
-
-def preset_names() -> list[str]:
-    """List the matrices that come with the package."""
-    files = resources.files("semgrid_eval.presets").iterdir()
-    return sorted(file.name.removesuffix(".yaml") for file in files if file.name.endswith(".yaml"))
 
 
 def load_matrix(name_or_path: str, *, models: Sequence[str] = ()) -> Matrix:

@@ -1,6 +1,7 @@
 """What a command imports before it works: help and versions wait for no heavy package."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -52,20 +53,26 @@ def test_the_help_of_a_source_waits_for_settings_alone(name):
     assert packages & HEAVY == set()
 
 
-def test_completion_of_names_imports_no_command(monkeypatch):
-    for key, value in (
-        ("_SEMGRID_EVAL_COMPLETE", "bash_complete"),
-        ("COMP_WORDS", "semgrid-eval re"),
-        ("COMP_CWORD", "1"),
-    ):
-        monkeypatch.setenv(key, value)
+def completed(words, watched):
+    """Complete the last of some words as bash asks: the lines, and which of the watched modules were imported."""
+    asked = {"_SEMGRID_EVAL_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" "))}
     program = (
         "import sys\nfrom semgrid_eval.cli.main import cli\n"
         "try:\n    cli.main(prog_name='semgrid-eval')\n"
-        "finally:\n    print(sorted(name for name in sys.modules if name == 'semgrid_eval.cli.report'))"
+        f"finally:\n    print(sorted({watched} & sys.modules.keys()))"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == ["plain,report", "[]"]
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | asked)
+    return done.stdout.splitlines()
+
+
+def test_completion_of_names_imports_no_command():
+    assert completed("semgrid-eval re", {"semgrid_eval.cli.report"}) == ["plain,report", "[]"]
+
+
+def test_a_matrix_is_completed_to_a_preset_or_else_a_file_without_waiting_for_torch():
+    assert completed("semgrid-eval run ref", HEAVY | OF_SETTINGS) == ["plain,reference", "[]"]
+    assert completed("semgrid-eval run my_ma", HEAVY | OF_SETTINGS) == ["file,my_ma", "[]"]
 
 
 def test_every_command_is_listed_with_a_short_line_that_its_help_does_not_repeat():

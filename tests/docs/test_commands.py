@@ -22,6 +22,7 @@ LESS = {
     "latency": "--frames 6 --warm-up 2",
     "run paper-cpu": "--row BL-DC --row BL-Fuse --jobs 1",
     "run real": "--row BL-DC --jobs 1",
+    "run disturb": "--row 'BL-DC*' --jobs 1",
     "run stream-cpu": "--row 'newest +0' --row 'BL-Fuse +40' --row 'RN-town +0' --jobs 1",
     "run baselines --model": "--row Mine --row BL-DC",
 }
@@ -37,20 +38,22 @@ def workplace(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(page):
-    """Run a page's commands, but for what installs."""
+def run(page, but=None):
+    """Run a page's commands, but for what installs and the command that begins with `but`."""
     for line in commands(text_of(page)):
         if not line.startswith("semgrid-eval "):
             continue
         line = line.removeprefix("semgrid-eval ")
+        if but and line.startswith(but):
+            continue
         less = next((options for start, options in LESS.items() if line.startswith(start)), "")
         words = [part for word in shlex.split(line) for part in (sorted(map(str, Path().glob(word))) or [word])]
         ended = run_command(words + shlex.split(less))
         assert ended.code == FINDINGS.get(line, 0), f"{line}\n{ended.err}"
 
 
-def toy_logs(folder):
-    for number, split in enumerate(("train", "val")):
+def toy_logs(folder, splits=("train", "val")):
+    for number, split in enumerate(splits):
         world = street(number, frames=30, speed_mps=8.0, noise_px=0.05)
         write_log(world.recording(f"toy_{number:06}_000000", split), Path(folder) / split / f"toy{number}.mcap")
 
@@ -101,10 +104,32 @@ def test_report_and_playback(workplace):
     assert Path("play.layout.json").is_file()
 
 
+@pytest.mark.slow
+def test_shell_and_gate(workplace):
+    toy_logs("logs", ("train", "val", "val"))
+    for name in ("first", "before", "after"):
+        ended = run_command(["run", "baselines", "--logs", "logs", "--out", f"runs/{name}", "--row", "BL-*C"])
+        assert ended.code == 0, ended.err
+    town = Path("logs/.towns/town-0123456789abcdef")
+    town.mkdir(parents=True)
+    (town / "town.json").write_text("{}")
+    run("docs/shell.md")
+    assert len(list(Path("runs/first/grids").glob("*.npz"))) == 3  # those of a run that is named stay
+    run("docs/gate.md")
+    assert Path("page/index.html").is_file()
+
+
 def test_check(workplace):
     toy_logs("logs")
     Path("recording.yaml").write_text(blocks("yaml", text_of("docs/check.md"))[0])
     run("docs/check.md")
+
+
+@pytest.mark.slow
+def test_disturbances(workplace):
+    toy_logs("LOGS")  # in place of the frozen data set, which has one size
+    run("docs/disturbances.md", but="convert town-v1")
+    assert Path("RUN/report/tables/disturbances.md").is_file()
 
 
 @pytest.mark.slow

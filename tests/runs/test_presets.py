@@ -8,7 +8,8 @@ import pytest
 from semgrid_eval.config import parse_config
 from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
 from semgrid_eval.models.residual import ResidualSettings
-from semgrid_eval.runs.matrix import load_matrix, preset_names
+from semgrid_eval.presets import preset_names
+from semgrid_eval.runs.matrix import load_matrix
 
 SCALED = ("paper-cpu", "architecture-cpu", "sensitivity")
 TOLD = ("ceiling", "ceiling-PH1", "ceiling-PH2", "ceiling-PH3", "fresh-errors", "true-motion")

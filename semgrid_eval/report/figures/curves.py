@@ -16,9 +16,9 @@ from semgrid_eval.report.rows.load import Result, Row
 from semgrid_eval.scores.metrics.table import CALIBRATION
 
 _CAPTION = (
-    "How often a model is right when it is so certain, above, and how many cells that are, below: of the cells that it "
-    "does not leave unknown, all repeats together. It is honest on the dotted line; error is the expected calibration "
-    "error, the mean over repeats."
+    "Above, how often a model is right by how certain it is; below, in how many cells it is so certain. Cells that it "
+    "leaves unknown are left out, and all repeats are pooled. On the dotted line it is right as often as it says; "
+    "error is the expected calibration error, the mean over repeats."
 )
 
 

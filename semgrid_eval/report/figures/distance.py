@@ -13,7 +13,7 @@ from semgrid_eval.report.figures import style
 from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.rows.pairing import main_group, rows_alike
 
-_CAPTION = "IoU by distance from the vehicle, with 95% intervals, of the rows that are asked the same as most others"
+_CAPTION = "IoU by distance from the vehicle, with 95% intervals, of rows with the commonest inputs, sensors and lead"
 
 
 def distance_plots(parts: Parts, rows: Sequence[Row]) -> list[style.Plot]:

@@ -16,6 +16,7 @@ from semgrid_eval.report.tables.numbers import MINUS, interval, interval_phrase,
 from semgrid_eval.report.tables.streams import stream_sentence
 from semgrid_eval.report.tables.targets import fusion_sentence, not_compared_sentence
 from semgrid_eval.report.tables.truth import way_sentence
+from semgrid_eval.scores.metrics.iou import Iou
 from semgrid_eval.words import plural
 
 _FEW_RECORDINGS, _FEW_SEEDS = 10, 5
@@ -43,8 +44,9 @@ class Summary:
     """The head of a page: sentences, and tiles with what they compare."""
 
     sentences: tuple[str, ...]
-    compared: str
-    tiles: tuple[Tile, ...]
+    compared: str = ""
+    tiles: tuple[Tile, ...] = ()
+    terms: str = ""  # what the words of sentences and tiles mean
 
 
 def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None, streams: Sequence[Strategy] = ()) -> Summary:
@@ -52,7 +54,7 @@ def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None, strea
     rows = [entry.row for entry in scores.values()]
     evidence = _evidence(runs, [row for row in rows if found is None or comparable(row, found.best)])
     if found is None:
-        return Summary(("No row has a score: nothing can be compared.", evidence), "", ())
+        return Summary(("No row has a score: nothing can be compared.", evidence))
     more = (
         stream_sentence(streams),
         way_sentence(scores, found.best),
@@ -62,9 +64,19 @@ def summarise(runs: Sequence[Run], scores: Scores, found: Headline | None, strea
     )
     sentences = tuple(filter(None, (_like_for_like(scores, found), _of_all(scores, found), *more)))
     if found.rival is None:
-        return Summary(sentences, "", ())
+        return Summary(sentences)
     tiles = _tiles(scores, found.best, found.rival)
-    return Summary(sentences, f"{found.best.name} {MINUS} {found.rival.name}", tiles)
+    compared = f"{found.best.name} {MINUS} {found.rival.name}"
+    return Summary(sentences, compared, tiles, _terms(shared_iou(scores.values())))
+
+
+def _terms(iou: Iou) -> str:
+    """Say what a window is, and which classes stand behind the tiles."""
+    classes = iou.classes
+    of = {column: ", ".join(iou.labels[classes.names[i]] for i in classes.averaged[column]) for column in iou.compared}
+    groups = "; ".join(f"{iou.labels[column]}: {names}" for column, names in of.items() if column != HEADLINE)
+    window = "A window is the inputs of one prediction and its target."
+    return f"{window} IoU is intersection over union, averaged over classes; known are all but unknown. {groups}."
 
 
 def _like_for_like(scores: Scores, found: Headline) -> Markup:

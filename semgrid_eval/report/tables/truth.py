@@ -63,7 +63,7 @@ def order_sentence(measured: Scores, expected: Scores, order: Order) -> str:
     more = len(order.swapped) - len(shown)
     pairs = "; ".join(shown) + (f"; and {plural(more, 'more pair')}" if more else "")
     clear = [pair for pair in order.swapped if any(_is_clear(each, pair) for each in (measured, expected))]
-    words = f"clearly different against either target: {len(clear)} of them"
+    words = f"{len(clear) or 'none'} of them clearly different against at least one of the targets"
     return f"The order of the {count} rows by mean class IoU changes: {pairs} change places ({words})."
 
 
@@ -98,6 +98,6 @@ def way_sentence(scores: Scores, row: Row | None) -> str:
     for entry, way in ways(scores):
         share = way.share(entry, HEADLINE)
         if row is not None and entry.row.name == row.name and finite(share.value) is not None:
-            top = f"Who knows the world exactly has {number(way.upper.mean[HEADLINE])} ({way.upper.row.name})"
+            top = f"Knowing the world exactly gives {number(way.upper.mean[HEADLINE])} ({way.upper.row.name})"
             return f"{top}: {row.name} has covered {percent(share.value)} of the way there from {way.lower.row.name}."
     return ""

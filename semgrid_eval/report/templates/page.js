@@ -88,11 +88,12 @@ const element = (kind, properties, ...children) => {
   }
 
   // What scrolls sideways says so, and is reached by keyboard, too.
+  const drawings = [...document.querySelectorAll(".canvas > svg")];
   const sized = new ResizeObserver((entries) => {
     for (const place of new Set(entries.map((entry) => entry.target.closest(".canvas, .scroll")))) {
       const wide = place.scrollWidth > place.clientWidth, drawing = place.querySelector(":scope > svg");
       place.parentElement.classList.toggle("wide", wide);
-      if (wide && drawing) Object.assign(place, { tabIndex: 0, role: "region", ariaLabel: drawing.getAttribute("aria-label") });
+      if (wide && drawing) Object.assign(place, { tabIndex: 0, role: "region", ariaLabel: `Figure ${drawings.indexOf(drawing) + 1}: ${drawing.getAttribute("aria-label")}` });
       else if (drawing) for (const name of ["tabindex", "role", "aria-label"]) place.removeAttribute(name);
     }
   });

@@ -124,7 +124,7 @@ def test_who_is_told_of_the_truth_is_never_best_nor_a_baseline_nor_in_the_main_g
 def test_the_page_says_how_far_the_best_row_has_come():
     scores = score_rows(rows_of(), np.random.default_rng(0))
     text = way_sentence(scores, headline(scores).best)
-    assert text == "Who knows the world exactly has 0.900 (top): ED-DC has covered 50% of the way there from BL-DC."
+    assert text == "Knowing the world exactly gives 0.900 (top): ED-DC has covered 50% of the way there from BL-DC."
     assert way_sentence(score_rows(rows_of()[:2], np.random.default_rng(0)), None) == ""
 
 
@@ -195,7 +195,7 @@ def test_files_have_the_shares_and_the_second_target(told_run, tmp_path):
     text = page.read_text()
     assert 'id="table-way"' in text
     assert 'id="table-expected"' in text
-    assert "Who knows the world exactly has" in text
+    assert "Knowing the world exactly gives" in text
 
 
 @pytest.fixture(scope="module")
@@ -215,7 +215,7 @@ def test_without_the_second_target_nothing_is_said_of_it(run, tmp_path):
     page = write_report(run, tmp_path / "report")
     text = page.read_text()
     assert 'id="table-expected"' not in text
-    assert "No row here knows the truth" in text
+    assert "No row here is told the truth" in text
     assert pd.read_csv(page.parent / "expected.csv").empty
 
 

@@ -241,18 +241,19 @@ THIN = "document.querySelectorAll('tbody:nth-of-type(n+4), .window:nth-of-type(n
 
 
 @pytest.mark.parametrize(
-    ("name", "scheme", "options"),
+    ("name", "width", "scheme", "options"),
     [
-        ("page", "light", {}),
-        ("page", "dark", {"runOnly": {"type": "rule", "values": [CONTRAST]}}),
-        ("side_by_side", "light", {"rules": {CONTRAST: {"enabled": False}}}),
-        ("troubled", "light", {"rules": {CONTRAST: {"enabled": False}}}),
+        ("page", 1280, "light", {}),
+        ("page", 1280, "dark", {"runOnly": {"type": "rule", "values": [CONTRAST]}}),
+        ("side_by_side", 1280, "light", {"rules": {CONTRAST: {"enabled": False}}}),
+        ("troubled", 1280, "light", {"rules": {CONTRAST: {"enabled": False}}}),
+        ("reference_page", 390, "light", {"rules": {CONTRAST: {"enabled": False}}}),
     ],
 )
-def test_axe_finds_nothing_serious(browser, request, axe, name, scheme, options):
+def test_axe_finds_nothing_serious(browser, request, axe, name, width, scheme, options):
     features = [{"name": "prefers-color-scheme", "value": scheme}]
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-    open_page(browser, request.getfixturevalue(name), width=1280)
+    open_page(browser, request.getfixturevalue(name), width=width)
     browser.execute_script("document.querySelectorAll('details').forEach(part => { part.open = true; })")
     if name != "page":
         browser.execute_script(THIN)
