@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 
+from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, yaw_of
 from semgrid_eval.sources.ros2.cameras_seen import CameraSeen, cameras_of, words_of
 from semgrid_eval.sources.ros2.contents import Contents
 from semgrid_eval.sources.ros2.draft_lidars import lidar_names, place_lines
 from semgrid_eval.sources.ros2.labels import likely_ids
-from semgrid_eval.sources.ros2.transforms import extrinsics_of
 
 _ONLY = "front"
 _LONGEST_NAME = 40  # of a sensor in a grid
@@ -46,7 +46,8 @@ def _main_first(cameras: Sequence[CameraSeen], contents: Contents, vehicle: str)
         frame = _frame(camera, contents)
         if not contents.transforms.has(vehicle, frame):
             return float("inf")
-        return round(abs(extrinsics_of(contents.transforms.lookup(vehicle, frame)).yaw_rad), 3)
+        vehicle_from_camera = contents.transforms.lookup(vehicle, frame) @ CAMERA_FROM_OPTICAL.inverse()
+        return round(abs(yaw_of(vehicle_from_camera.rotation)), 3)
 
     main = min(cameras, key=away, default=None)
     return [] if main is None else [main, *(camera for camera in cameras if camera is not main)]
