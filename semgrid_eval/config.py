@@ -1,6 +1,7 @@
 """Strict, frozen configuration: an unknown key or impossible value is an error naming file, place and allowed keys."""
 
 import json
+import math
 import re
 from collections.abc import Hashable, Iterable, Mapping
 from pathlib import Path
@@ -92,6 +93,13 @@ for _name, _pattern, _first in (
     _StrictLoader.add_implicit_resolver(_tag(_name), re.compile(f"^({_pattern})$"), _first)
 _StrictLoader.add_constructor(_tag("int"), _StrictLoader.construct_int)
 
+
+class _StrictDumper(yaml.SafeDumper):
+    """Quotes the words that `_StrictLoader` takes for something else."""
+
+    yaml_implicit_resolvers = _StrictLoader.yaml_implicit_resolvers
+
+
 C = TypeVar("C", bound=BaseModel)
 
 
@@ -150,6 +158,12 @@ def load_yaml(path: Path) -> Any:  # noqa: ANN401 - anything that YAML can hold
         return yaml.load(content.decode(), Loader=_StrictLoader)
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: not UTF-8, or a number of 5,000 digits
         raise ConfigError(f"is not valid YAML: {unreadable(error)}", path=path) from error
+
+
+def yaml_word(word: str) -> str:
+    """Write a word in ASCII as `load_yaml` reads it anywhere, within braces too: in quotes where it needs them."""
+    listed: str = yaml.dump([word], Dumper=_StrictDumper, default_flow_style=True, width=math.inf)
+    return listed.removeprefix("[").removesuffix("]\n")
 
 
 def _first_fault(model: type[BaseModel], error: ValidationError, path: Path | str | None) -> ConfigError:

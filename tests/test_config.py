@@ -1,6 +1,11 @@
-import pytest
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from semgrid_eval.config import Config, load_yaml, parse_config
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from semgrid_eval.config import Config, load_yaml, parse_config, yaml_word
 from semgrid_eval.errors import ConfigError
 
 
@@ -43,6 +48,26 @@ def test_plain_values_are_those_of_yaml_1_2(tmp_path):
     assert list(load_yaml(path).values()) == [1e-4, "off", "2020-01-01", 12, True, 0.5, None, "1.2.3"]
     path.write_text("a: 1:30\nb: 0o17\nc: 0x1F\nd: -7\ne: 1_000\nf: 0\ng: '010'\nh: 01.5\ni:\nj: 0b11")
     assert list(load_yaml(path).values()) == ["1:30", 15, 31, -7, "1_000", 0, "010", 1.5, None, "0b11"]
+
+
+@example("1e5")
+@example("true")
+@example("/a: b")
+@example("x" * 300 + " y")
+@given(st.text(min_size=1))
+def test_a_word_that_is_written_is_read_again_as_key_and_within_braces(word):
+    written = yaml_word(word)
+    assert written.isascii()
+    assert "\n" not in written
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "m.yaml"
+        path.write_text(f"{written}: # a key\n  inner: {{size: {written}, other: 1}}  # within braces\n")
+        assert load_yaml(path) == {word: {"inner": {"size": word, "other": 1}}}
+
+
+@pytest.mark.parametrize("word", ["/front/image_raw", "base_link", "off", "label-ids"])
+def test_a_plain_word_is_written_as_it_is(word):
+    assert yaml_word(word) == word
 
 
 def test_a_merge_key_is_a_key_as_any_other(tmp_path):

@@ -21,8 +21,11 @@ def show(summary: "ConversionSummary", out: Path) -> int:
         complain(
             f"Warning: {out} holds {plural(len(others), 'log')} beside those of this conversion, such as {others[0]}"
         )
-    if summary.remark and (summary.written or summary.skipped):  # it is about logs that there are
-        (complain if summary.remark.startswith("Warning") else say)(summary.remark)
+    if summary.written or summary.skipped:  # what is said is about logs that there are
+        if summary.warning:
+            complain(f"Warning: {summary.warning}")
+        if summary.remark:
+            say(summary.remark)
     return 1 if summary.failed else 0
 
 

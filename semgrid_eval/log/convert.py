@@ -62,6 +62,7 @@ class ConversionSummary:
     failed: dict[str, str] = field(default_factory=dict)  # reasons
     all_splits: bool = False  # these are all recordings of all splits: no other log belongs beside theirs
     remark: str = ""  # what else the source has to say, one line
+    warning: str = ""  # what seems wrong with the logs, one line
 
     @property
     def labels(self) -> set[str]:

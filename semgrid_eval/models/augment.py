@@ -7,10 +7,9 @@ import torch
 from pydantic import Field
 from torch import Tensor
 
-from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.config import Config
 from semgrid_eval.windows.data import WindowBatch
-from semgrid_eval.windows.grids import covered_without_truth, shift_grids
+from semgrid_eval.windows.grids import cells_before_turn, covered_without_truth, shift_grids, take_cells
 
 
 class AugmentConfig(Config):
@@ -41,8 +40,7 @@ def augment(batch: WindowBatch, config: AugmentConfig, generator: torch.Generato
     if config.misalign_cells:
         most = config.misalign_cells
         batch = misaligned(batch, torch.randint(-most, most + 1, (windows, inputs, 2), generator=generator))
-    aligned = batch.past if translate else shift_grids(batch.past, batch.shift_cells[:, None])
-    return replace(batch, mask=covered_without_truth(aligned, batch.target))
+    return replace(batch, mask=covered_without_truth(batch.aligned(translate=translate), batch.target))
 
 
 def flipped(batch: WindowBatch, chosen: Tensor) -> WindowBatch:
@@ -57,20 +55,19 @@ def flipped(batch: WindowBatch, chosen: Tensor) -> WindowBatch:
 def rotated(batch: WindowBatch, angle_rad: Tensor) -> WindowBatch:
     """Turn windows, each by its angle (B,), to the left about the middle of the grid's lower edge; M is left as it was.
 
-    There the paper's grid has the vehicle. Cells take the class of the cell that their centres come from, or are
-    unknown where that lies outside.
+    There the paper's grid has the vehicle. What comes from outside the grid is unknown.
     """
     device = batch.target.device
     cos, sin = (each.float().to(device, non_blocking=True) for each in (angle_rad.cos(), angle_rad.sin()))
     rows, columns = batch.target.shape[-2:]
-    source = _turned_from(cos, sin, rows, columns)
+    row, column = cells_before_turn(cos, sin, (rows - 0.5, columns / 2.0 - 0.5), (rows, columns))
     row_shift, column_shift = batch.shift_cells.float().unbind(-1)  # (B, T) each
     cos, sin = cos[:, None], sin[:, None]
     turned = torch.stack([cos * row_shift - sin * column_shift, sin * row_shift + cos * column_shift], dim=-1)
     return replace(
         batch,
-        past=_gathered(batch.past, source[:, None, None]),
-        target=_gathered(batch.target, source),
+        past=take_cells(batch.past, row[:, None, None], column[:, None, None]),
+        target=take_cells(batch.target, row, column),
         shift_cells=turned.round().long(),
     )
 
@@ -82,22 +79,3 @@ def misaligned(batch: WindowBatch, moved_cells: Tensor) -> WindowBatch:
     """
     moved_cells = moved_cells.to(batch.past.device, non_blocking=True)
     return replace(batch, past=shift_grids(batch.past, moved_cells[:, None]))
-
-
-def _turned_from(cos: Tensor, sin: Tensor, rows: int, columns: int) -> Tensor:
-    """Return the flat index of the cell that each cell takes its class from, -1 outside: (B,) -> (B, H, W)."""
-    middle_row, middle_column = rows - 0.5, columns / 2.0 - 0.5
-    down = (torch.arange(rows, device=cos.device) - middle_row)[:, None]
-    right = (torch.arange(columns, device=cos.device) - middle_column)[None]
-    cos, sin = cos[:, None, None], sin[:, None, None]
-    row = torch.floor(cos * down + sin * right + middle_row + 0.5).long()
-    column = torch.floor(cos * right - sin * down + middle_column + 0.5).long()
-    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    return (row * columns + column).masked_fill(~inside, -1)
-
-
-def _gathered(grids: Tensor, source: Tensor) -> Tensor:
-    """Take the classes of other cells of the same grid, unknown from -1: (..., H, W) by (..., H, W)."""
-    flat, index = grids.flatten(-2), source.expand(grids.shape).flatten(-2)
-    taken = flat.gather(-1, index.clamp(min=0)).masked_fill(index < 0, UNKNOWN)
-    return taken.reshape(grids.shape)

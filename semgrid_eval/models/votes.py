@@ -10,7 +10,6 @@ from semgrid_eval.config import Config
 from semgrid_eval.grids.draws import MOST_DRAWS, Draws
 from semgrid_eval.models.model import Given, Model, truth_of
 from semgrid_eval.windows.data import WindowBatch
-from semgrid_eval.windows.grids import shift_grids
 
 
 class DrawSettings(Config):
@@ -58,5 +57,4 @@ def likeliest(votes: Tensor, seen: Tensor | None = None) -> Tensor:
 
 def seen_cells(batch: WindowBatch, *, translate: bool) -> Tensor:
     """Tell which cells an input knows, moved into the target's place: (B, H, W) bool."""
-    aligned = batch.past if translate else shift_grids(batch.past, batch.shift_cells[:, None])
-    return (aligned != UNKNOWN).flatten(1, 2).any(dim=1)
+    return (batch.aligned(translate=translate) != UNKNOWN).flatten(1, 2).any(dim=1)

@@ -16,7 +16,7 @@ from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.fingerprint import kept_fingerprints
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import find_logs
-from semgrid_eval.progress import Stage
+from semgrid_eval.progress import Progress, Stage
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.results import LogRecord
 from semgrid_eval.sensors.kinds import misfit
@@ -110,51 +110,52 @@ class RunData:
     def grids(self, config: GridConfig) -> GridDataSet:
         """Return the grids of all recordings, on disk."""
         key = grid_digest(config)
-        if key not in self._sets and (misfits := self._misfits(config)):
-            self._sets[key] = GridDataSet(failed=misfits)  # which is the rows' fault: no log is to be told of
-        if key not in self._sets:
-            with self._stage("grids") as progress:
-                data_set = build_grids(
-                    self._logs,
-                    self.cache,
-                    config,
-                    sensors=self._sensors[key],
-                    executor=self._executor,
-                    progress=progress,
-                )
-            self._sets[key] = data_set
-            for log, reason in data_set.failed.items():
-                path = str(Path(log).relative_to(self._folder))
-                self.failed[path] = reason.replace(log, path)
-            for recording in data_set.recordings:
-                path = str(Path(recording.log).relative_to(self._folder))
-                other = self.log_of.setdefault(recording.name, path)
-                if other != path:
-                    raise InputError(f"{path} and {other} both hold {recording.name}", path=self._folder)
-                if path in self.records:  # by another configuration of grids
-                    continue
-                self.records[path] = LogRecord(
-                    name=Path(recording.log).stem,
-                    path=path,
-                    digest=recording.digest,
-                    split=recording.split,
-                    dataset=recording.dataset,
-                    group=recording.group,
-                    checksums=recording.has_checksums,
-                    recovered=recording.recovered,
-                )
+        if key in self._sets:
+            return self._sets[key]
+        with self._stage("grids") as progress:
+            if misfits := self._misfits(config, progress):
+                self._sets[key] = GridDataSet(failed=misfits)  # which is the rows' fault: no log is to be told of
+                return self._sets[key]
+            self._sets[key] = build_grids(
+                self._logs, self.cache, config, sensors=self._sensors[key], executor=self._executor, progress=progress
+            )
+        self._note(self._sets[key])
         return self._sets[key]
 
-    def _misfits(self, config: GridConfig) -> dict[str, str]:
+    def _note(self, data_set: GridDataSet) -> None:
+        """Note which logs gave grids, and why others failed."""
+        for log, reason in data_set.failed.items():
+            path = str(Path(log).relative_to(self._folder))
+            self.failed[path] = reason.replace(log, path)
+        for recording in data_set.recordings:
+            path = str(Path(recording.log).relative_to(self._folder))
+            other = self.log_of.setdefault(recording.name, path)
+            if other != path:
+                raise InputError(f"{path} and {other} both hold {recording.name}", path=self._folder)
+            if path in self.records:  # by another configuration of grids
+                continue
+            self.records[path] = LogRecord(
+                name=Path(recording.log).stem,
+                path=path,
+                digest=recording.digest,
+                split=recording.split,
+                dataset=recording.dataset,
+                group=recording.group,
+                checksums=recording.has_checksums,
+                recovered=recording.recovered,
+            )
+
+    def _misfits(self, config: GridConfig, progress: Progress) -> dict[str, str]:
         """Say of each log why it cannot have what a grid's sensors look at; nothing where one may, or is damaged."""
         found = {}
-        for log in self._logs:
+        for done, log in enumerate(self._logs, start=1):
             fault = None
             with suppress(LogError), LogReader(log) as reader:
                 fault = misfit(reader, config.sensors.values())
             if fault is None:
                 return {}
             found[str(log)] = fault
+            progress(done, len(self._logs), log.stem)
         return found
 
     def _why_none(self, data_set: GridDataSet, split: str) -> str:

@@ -228,13 +228,13 @@ def _combinations(axes: _Axes, place: str) -> Iterator[dict[str, Any]]:
 
 
 def _fill(row: dict[str, Any], values: dict[str, Any], place: str) -> dict[str, Any]:
+    name = row.get("name", values.get("name"))  # as it is written, so that it can have a place for an axis `name`, too
     for key, value in values.items():
         _require_settable(row, key, place)
         nested: Any = value
         for part in reversed(key.split(".")):
             nested = {part: nested}
         row = merged(row, nested)
-    name = row.get("name")
     if not isinstance(name, str):
         return row
     for key, value in values.items():

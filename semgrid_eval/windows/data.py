@@ -36,6 +36,10 @@ class WindowBatch:
     # (B, 2, H, W) uint8 class ids and their certainty, 255 = 1, of a model that says so by `Model.answers_in`.
     answers: Tensor | None = None
 
+    def aligned(self, *, translate: bool) -> Tensor:
+        """Return the inputs in the target's place (B, S, T, H, W), where they are already if the row translates."""
+        return self.past if translate else shift_grids(self.past, self.shift_cells[:, None])
+
 
 class Answers(Protocol):
     """Answers that were made elsewhere, read when they are asked for."""

@@ -176,13 +176,46 @@ def shift_grids(grids: Tensor, shift_cells: Tensor) -> Tensor:
     rows, columns = grids.shape[-2:]
     source_row = torch.arange(rows, device=grids.device) - shift_cells[..., 0:1]  # (..., H)
     source_column = torch.arange(columns, device=grids.device) - shift_cells[..., 1:2]  # (..., W)
-    inside = ((source_row >= 0) & (source_row < rows))[..., :, None] & (
-        (source_column >= 0) & (source_column < columns)
-    )[..., None, :]
-    source = source_row.clamp(0, rows - 1)[..., :, None] * columns + source_column.clamp(0, columns - 1)[..., None, :]
+    return take_cells(grids, source_row[..., :, None], source_column[..., None, :])
+
+
+def cells_before_turn(
+    cosine: Tensor, sine: Tensor, pivot: tuple[float, float], size: tuple[int, int]
+) -> tuple[Tensor, Tensor]:
+    """Find where cells were before content was turned counterclockwise, seen from above, about a point.
+
+    A cell takes the class of the cell that its middle comes from, worked out in the precision of the angles.
+
+    Args:
+        cosine: of the angles (...).
+        sine: of the angles (...).
+        pivot: row and column that stay in place; cells have their middles at whole numbers.
+        size: rows H and columns W of a grid.
+
+    Returns:
+        Row and column, (..., H, W) each, which may lie outside the grid.
+    """
+    down, right = (
+        torch.arange(count, dtype=cosine.dtype, device=cosine.device) - middle
+        for count, middle in zip(size, pivot, strict=True)
+    )
+    cosine, sine, down = cosine[..., None, None], sine[..., None, None], down[:, None]
+    row = torch.floor(cosine * down + sine * right + pivot[0] + 0.5).long()
+    column = torch.floor(cosine * right - sine * down + pivot[1] + 0.5).long()
+    return row, column
+
+
+def take_cells(grids: Tensor, row: Tensor, column: Tensor) -> Tensor:
+    """Take the classes of other cells of the same grid, unknown from outside it.
+
+    (..., H, W) by rows and columns that broadcast to it -> (..., H, W).
+    """
+    rows, columns = grids.shape[-2:]
+    inside = ((row >= 0) & (row < rows)) & ((column >= 0) & (column < columns))
+    source = row.clamp(0, rows - 1) * columns + column.clamp(0, columns - 1)
     flat = grids.flatten(-2)
-    moved = flat.gather(-1, source.flatten(-2).expand(flat.shape)).reshape(grids.shape)
-    return moved.masked_fill_(~inside, UNKNOWN)  # `torch.where` with a number waits for the device
+    taken = flat.gather(-1, source.flatten(-2).expand(flat.shape)).reshape(grids.shape)
+    return taken.masked_fill_(~inside, UNKNOWN)  # `torch.where` with a number waits for the device
 
 
 def covered_without_truth(aligned: Tensor, target: Tensor) -> Tensor:

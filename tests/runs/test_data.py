@@ -1,5 +1,6 @@
 """What a run knows of its logs: grids are made when asked for, and a benchmark's logs are fingerprinted."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
@@ -25,9 +26,9 @@ def logs(tmp_path_factory):
     return folder
 
 
-def data_of(logs, cache):
-    rows = load_matrix("baselines").rows[:1]
-    return RunData(logs, cache, rows, executor=InProcess(), device=torch.device("cpu"), stage=silent_stage)
+def data_of(logs, cache, matrix="baselines", stage=silent_stage):
+    rows = load_matrix(matrix).rows[:1]
+    return RunData(logs, cache, rows, executor=InProcess(), device=torch.device("cpu"), stage=stage)
 
 
 def test_the_logs_of_a_published_benchmark_alone_are_fingerprinted(logs, tmp_path):
@@ -52,6 +53,19 @@ def test_a_log_that_was_recovered_says_what_it_lost(logs, tmp_path):
     told = {path: record.recovered for path, record in found.records.items()}
     assert told["val/whole.mcap"] == ""
     assert told["val/saved.mcap"].startswith("was recovered from a damaged log, which lost ")
+
+
+def test_progress_is_told_of_logs_that_cannot_have_what_a_row_looks_at(logs, tmp_path):
+    told = []
+
+    def progress(*of):
+        told.append(of)
+
+    found = data_of(logs, tmp_path, "sensors", lambda label: nullcontext(progress))
+    found.prepare()
+    assert told == [(1, 3, "own"), (2, 3, "town-v1_small"), (3, 3, "town-v1_tiny")]
+    assert found.failed == {}
+    assert "left" in next(iter(found.grids(load_matrix("sensors").rows[0].grid).failed.values()))
 
 
 @NEEDS_PROC

@@ -25,6 +25,14 @@ def test_axes_multiply_rows_and_fill_in_names(tmp_path):
     ]
 
 
+def test_an_axis_of_names_fills_a_place_in_the_name_that_is_written(tmp_path):
+    together = {"name": ["BL", "ED"], "model": ["newest", "ed"]}
+    axes = {"grid": {"window.inputs": [2, 3]}, "zip": together}
+    rows = load(tmp_path, {"rows": [{"name": "{name}-SL{window.inputs}", "axes": axes}]}).rows
+    told = [(row.name, row.model, row.window.inputs) for row in rows]
+    assert told == [("BL-SL2", "newest", 2), ("ED-SL2", "ed", 2), ("BL-SL3", "newest", 3), ("ED-SL3", "ed", 3)]
+
+
 def test_rows_override_defaults_key_by_key(tmp_path):
     matrix = load(
         tmp_path,

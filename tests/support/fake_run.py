@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from support.fake_scenes import ID, SIDE, Grid, scene, seen_from
 
 from semgrid_eval.arrays import write_arrays
-from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
+from semgrid_eval.classes import CLASS_COUNT, UNKNOWN
 from semgrid_eval.files import digest_value
 from semgrid_eval.grids.spec import MOVING, STANDING, GridSpec
 from semgrid_eval.report.rows.load import Result, Row
@@ -18,10 +19,7 @@ from semgrid_eval.scores.metrics.table import count_windows
 from semgrid_eval.scores.sums import write_sums
 from semgrid_eval.seals import open_seal, write_sealed
 
-SIDE = 128
 FRAME_NS = 58_823_529
-Grid = NDArray[np.uint8]
-ID = {name: index for index, name in enumerate(CLASS_NAMES)}
 
 HOSTILE = ("<script>alert(1)</script>", "\"quoted\" & 'more'", "{{ 7 * 7 }} $x_1$ \\frac", "n" * 10_000)
 """Names that must be shown as text, wherever they come from."""
@@ -239,7 +237,7 @@ class _Maker:
             for n in names
             for k in range(windows)
         )
-        scenes = [_scene(np.random.default_rng([7, i]), k) for i in range(len(names)) for k in range(windows)]
+        scenes = [scene(np.random.default_rng([7, i]), k) for i in range(len(names)) for k in range(windows)]
         self.past = np.array([s[0] for s in scenes], np.uint8).reshape(-1, 2, SIDE, SIDE)
         self.target = np.array([s[1] for s in scenes], np.uint8).reshape(-1, SIDE, SIDE)
         self.truth = np.array([s[2] for s in scenes], np.uint8).reshape(-1, SIDE, SIDE)
@@ -324,70 +322,9 @@ def _log(name: str) -> str:
     return f"val/{name}.mcap"
 
 
-def _scene(rng: np.random.Generator, step: int) -> tuple[list[Grid], Grid, Grid, list[NDArray[np.bool_]]]:
-    """Two aligned inputs, the target as the sensor sees it, the world behind it, and where cars moved and stood."""
-    world = _street(rng)
-    cars = [(int(rng.integers(10, 100)), int(rng.choice([-6, -3, 2, 5])), int(rng.integers(-5, 6))) for _ in range(5)]
-    frames = [_with_cars(world, cars, when + step) for when in (-2, -1, 0)]
-    seen = [
-        np.where(_view(rng, back), frame, UNKNOWN).astype(np.uint8)
-        for frame, back in zip(frames, (10, 5, 0), strict=True)
-    ]
-    inputs, target = [_flicker(rng, s) for s in seen[:2]], _flicker(rng, seen[2])
-    moving = _near_cars([car for car in cars if car[2] != 0], step)
-    return inputs, target, frames[2], [moving, _near_cars([car for car in cars if car[2] == 0], step) & ~moving]
-
-
-def _street(rng: np.random.Generator) -> Grid:
-    world = np.full((SIDE, SIDE), ID["building"], np.uint8)
-    world[:, 20:108][rng.random((SIDE, 88)) < 0.02] = ID["vegetation"]
-    rows, slope = np.arange(SIDE), rng.uniform(-0.25, 0.25)
-    centre = 64 + slope * (SIDE - rows) + 3 * np.sin(rows / 20)
-    across = np.abs(np.arange(SIDE)[None] - centre[:, None])
-    world[(across > 18) & (across < 26) & (np.sin(rows / 9)[:, None] > 0)] = ID["vegetation"]
-    world[across < 15] = ID["sidewalk"]
-    world[across < 10] = ID["road"]
-    for _ in range(6):
-        row = int(rng.integers(4, SIDE - 4))
-        side = int(centre[row] + rng.choice([-12, 12]))
-        kind = rng.choice(["person", "pole_sign", "bicycle"])
-        world[row : row + 2, side : side + 2] = ID[str(kind)]
-    return world
-
-
-def _with_cars(world: Grid, cars: list[tuple[int, int, int]], when: int) -> Grid:
-    frame = world.copy()
-    for index, (row, offset, speed) in enumerate(cars):
-        top, left = max(0, row + speed * when), 64 + offset
-        frame[top : top + 6, left : left + 3] = ID["large_vehicle" if index == 4 else "car"]
-    return frame
-
-
-def _near_cars(cars: list[tuple[int, int, int]], when: int) -> NDArray[np.bool_]:
-    """The cells within one of a car's place at the target's time, or at the newest input's."""
-    near = np.zeros((SIDE, SIDE), bool)
-    for row, offset, speed in cars:
-        for top in (max(0, row + speed * when), max(0, row + speed * (when - 1))):
-            near[max(0, top - 1) : top + 7, 63 + offset : 68 + offset] = True
-    return near
-
-
-def _view(rng: np.random.Generator, back: int) -> NDArray[np.bool_]:
-    rows, columns = np.mgrid[0:SIDE, 0:SIDE]
-    ahead = SIDE - 1 - rows + back - 6
-    wide = np.abs(columns - 64) < 0.42 * ahead
-    shadow = np.abs(columns - rng.integers(30, 98)) < 0.06 * ahead - 2
-    return wide & ~shadow & (ahead > 4)
-
-
-def _flicker(rng: np.random.Generator, grid: Grid) -> Grid:
-    blocks = np.kron(rng.random((SIDE // 2, SIDE // 2)) < 0.03, np.ones((2, 2), bool))
-    return np.where(blocks, UNKNOWN, grid).astype(np.uint8)
-
-
 def _guess(rng: np.random.Generator, row: FakeRow, truth: Grid) -> tuple[Grid, Grid]:
     """A network that saw the truth through a wide view and got a share of it wrong, in blocks."""
-    view = np.array([_view(rng, 0) for _ in truth], bool).reshape(truth.shape)
+    view = np.array([seen_from(rng, 0) for _ in truth], bool).reshape(truth.shape)
     half = (len(truth), SIDE // 2, SIDE // 2)
     blocks = np.kron(rng.random(half) < row.wrong, np.ones((1, 2, 2), bool))
     guessed = np.where(blocks, np.roll(truth, 9, axis=2), truth)

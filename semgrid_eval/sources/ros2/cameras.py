@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.recording.types import CameraCalibration
 from semgrid_eval.sources.rectification import Maps, Rectification
-from semgrid_eval.sources.ros2.mapping import Extrinsics
 
 _LENSES = ("", "plumb_bob", "rational_polynomial")
 _FISHEYE = ("equidistant", "fisheye")
@@ -47,18 +45,6 @@ class Info:
         if rectified and any(self.d):
             raise InputError("has distortion and no P, so the image is not rectified: set rectified: false")
         return np.hstack([np.array(self.k).reshape(3, 3), np.zeros((3, 1))])
-
-
-def calibration_of(projection: NDArray[np.float64], baseline: float | None, place: Extrinsics) -> CameraCalibration:
-    """Put the parts of a calibration together."""
-    return CameraCalibration(
-        fx_px=float(projection[0, 0]),
-        fy_px=float(projection[1, 1]),
-        u0_px=float(projection[0, 2]),
-        v0_px=float(projection[1, 2]),
-        baseline_m=baseline,
-        **place.model_dump(),
-    )
 
 
 def rectification_of(info: Info, *, rectified: bool) -> Rectification:

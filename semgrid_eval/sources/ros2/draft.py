@@ -1,9 +1,8 @@
 """A first map file, guessed from types and names, with comments on what was guessed."""
 
-import json
-import re
 from collections.abc import Iterator
 
+from semgrid_eval.config import yaml_word
 from semgrid_eval.errors import printable
 from semgrid_eval.sources.ros2 import kinds
 from semgrid_eval.sources.ros2.contents import Contents
@@ -19,7 +18,7 @@ def draft_map(contents: Contents) -> str:
     lines = [
         "# Which topics of a bag are what; docs/own-car.md says what else can stand here.",
         "vehicle:",
-        f"  frame: {_written(vehicle)}  # x ahead, y left, z up",
+        f"  frame: {yaml_word(vehicle)}  # x ahead, y left, z up",
         "  height_m: 0.0  # of its origin above the ground",
         "  rear_axle_m: 0.0  # how far its origin lies ahead of the rear axle",
         *(["clock: received  # header stamps are all zero"] if contents.unstamped else []),
@@ -28,11 +27,6 @@ def draft_map(contents: Contents) -> str:
         *draft_lidars(contents, vehicle),
     ]
     return "".join(f"{printable(line)}\n" for line in lines)  # names in comments may be anything
-
-
-def _written(name: str) -> str:
-    """Write a name as YAML takes it: in quotes where it is not a plain one."""
-    return name if re.fullmatch(r"[A-Za-z_/][\w/.-]*", name) else json.dumps(name)
 
 
 def _vehicle_frame(contents: Contents) -> str:
@@ -44,15 +38,16 @@ def _vehicle_frame(contents: Contents) -> str:
 def _motion(contents: Contents, vehicle: str) -> Iterator[str]:
     odometry, twists, imus = (_of_kind(contents, kind) for kind in (kinds.ODOMETRY, kinds.TWIST, kinds.IMU))
     yield "motion:"
-    if odometry or twists:
-        yield f"  speed: {{topic: {[*odometry, *twists][0]}, by: twist}}" + ("  # or by: pose" if odometry else "")
+    if told := [*odometry, *twists]:
+        note = "  # or by: pose" if odometry else ""
+        yield f"  speed: {{topic: {yaml_word(told[0])}, by: twist}}{note}"
     else:
         yield "  speed: {topic: }  # nothing in the bag tells it: nav_msgs/Odometry or geometry_msgs/TwistStamped"
     if imus and not odometry:
         frame = contents.topics[imus[0]].frame
         is_linked = frame == vehicle or contents.transforms.has(vehicle, frame)
         note = "" if is_linked else "  # nothing links its frame to the vehicle: are its axes those of the vehicle?"
-        yield f"  yaw_rate: {{topic: {imus[0]}, aligned: {'false' if is_linked else 'true'}}}{note}"
+        yield f"  yaw_rate: {{topic: {yaml_word(imus[0])}, aligned: {'false' if is_linked else 'true'}}}{note}"
 
 
 def _of_kind(contents: Contents, kind: str) -> list[str]:

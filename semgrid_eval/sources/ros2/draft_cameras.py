@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 
+from semgrid_eval.config import yaml_word
+from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, yaw_of
 from semgrid_eval.sources.ros2.cameras_seen import CameraSeen, cameras_of, words_of
 from semgrid_eval.sources.ros2.contents import Contents
 from semgrid_eval.sources.ros2.draft_lidars import lidar_names, place_lines
 from semgrid_eval.sources.ros2.labels import likely_ids
-from semgrid_eval.sources.ros2.transforms import extrinsics_of
 
 _ONLY = "front"
 _LONGEST_NAME = 40  # of a sensor in a grid
@@ -46,7 +47,8 @@ def _main_first(cameras: Sequence[CameraSeen], contents: Contents, vehicle: str)
         frame = _frame(camera, contents)
         if not contents.transforms.has(vehicle, frame):
             return float("inf")
-        return round(abs(extrinsics_of(contents.transforms.lookup(vehicle, frame)).yaw_rad), 3)
+        vehicle_from_camera = contents.transforms.lookup(vehicle, frame) @ CAMERA_FROM_OPTICAL.inverse()
+        return round(abs(yaw_of(vehicle_from_camera.rotation)), 3)
 
     main = min(cameras, key=away, default=None)
     return [] if main is None else [main, *(camera for camera in cameras if camera is not main)]
@@ -67,10 +69,10 @@ def _names(cameras: Sequence[CameraSeen], taken: Sequence[str]) -> list[str]:
 
 
 def _block(name: str, camera: CameraSeen, contents: Contents) -> Iterator[str]:
-    yield f"  {name}:"
+    yield f"  {yaml_word(name)}:"
     if camera.image:
-        yield f"    image: {camera.image}"
-    yield f"    info: {camera.info or ' # no CameraInfo of its size in the bag'}"
+        yield f"    image: {yaml_word(camera.image)}"
+    yield f"    info: {yaml_word(camera.info) if camera.info else ' # no CameraInfo of its size in the bag'}"
     rectified = _is_rectified(camera.image or camera.depth, contents, camera.info)
     yield f"    rectified: {'true' if rectified else 'false'}"
     yield from _depth(camera)
@@ -80,16 +82,16 @@ def _block(name: str, camera: CameraSeen, contents: Contents) -> Iterator[str]:
 def _depth(camera: CameraSeen) -> Iterator[str]:
     """Say what tells the depth, and by which baseline."""
     if camera.disparity:
-        yield f"    disparity: {camera.disparity}"
+        yield f"    disparity: {yaml_word(camera.disparity)}"
     elif camera.depth:
-        yield f"    depth: {camera.depth}"
+        yield f"    depth: {yaml_word(camera.depth)}"
         yield f"    baseline_m: {_VIRTUAL_BASELINE_M}  # sets how finely depth is coded"
     elif camera.right:
-        yield f"    right: {camera.right}  # to be matched with the image"
+        yield f"    right: {yaml_word(camera.right)}  # to be matched with the image"
     else:
         yield from (f"    # {line}" for line in _SINGLE)
     if camera.right_info and (camera.disparity or not camera.depth):
-        yield f"    right_info: {camera.right_info}"
+        yield f"    right_info: {yaml_word(camera.right_info)}"
 
 
 def _labels(camera: CameraSeen, contents: Contents) -> Iterator[str]:
@@ -99,7 +101,7 @@ def _labels(camera: CameraSeen, contents: Contents) -> Iterator[str]:
         return
     highest = contents.topics[camera.labels].highest_id
     ids = "label_ids" if highest is None else likely_ids(highest)
-    yield f"    labels: {camera.labels}"
+    yield f"    labels: {yaml_word(camera.labels)}"
     yield f"    ids: {ids}  # the first image holds ids up to {highest}; or names: {{road: [0], car: [13, 14]}}"
 
 

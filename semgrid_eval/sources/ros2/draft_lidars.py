@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 
+from semgrid_eval.config import yaml_word
 from semgrid_eval.sources.ros2.clouds_seen import CloudSeen, TimesSeen
 from semgrid_eval.sources.ros2.contents import Contents, Seen
 
@@ -18,8 +19,8 @@ def draft_lidars(contents: Contents, vehicle: str) -> Iterator[str]:
         yield "lidars:"
     for name, (topic, seen) in zip(lidar_names(contents), swept.items(), strict=True):
         assert seen.cloud is not None
-        yield f"  {name}:"
-        yield f"    cloud: {topic}"
+        yield f"  {yaml_word(name)}:"
+        yield f"    cloud: {yaml_word(topic)}"
         yield from _fields(seen.cloud, seen.rate_hz)
         yield from place_lines(contents, vehicle, seen.frame or "the LiDAR", "it")
     for topic in sorted(_clouds(contents).keys() - swept.keys()):
@@ -50,7 +51,7 @@ def _fields(cloud: CloudSeen, rate_hz: float | None) -> Iterator[str]:
     if cloud.label_field is None:
         yield "    # no labels of points: a camera can colour them, `colour_from` of the sensor in a grid"
     else:
-        yield f"    label_field: {cloud.label_field}"
+        yield f"    label_field: {yaml_word(cloud.label_field)}"
         yield f"    ids: {cloud.ids}  # the first cloud holds ids up to {cloud.highest_id}; or names: {{road: [40]}}"
 
 
@@ -61,8 +62,8 @@ def _times(seen: TimesSeen | None, rate_hz: float | None) -> str:
     times = seen.guess(_NS_PER_S / rate_hz if rate_hz else None)
     if times is None:
         told = f"the first cloud does not tell the unit of {seen.field}; without times {counted}"
-        return f"    # times: {{field: {seen.field}, unit: , since: }}  # {told}"
-    return f"    times: {{field: {times.field}, unit: {times.unit}, since: {times.since}}}  # of each point"
+        return f"    # times: {{field: {yaml_word(seen.field)}, unit: , since: }}  # {told}"
+    return f"    times: {{field: {yaml_word(times.field)}, unit: {times.unit}, since: {times.since}}}  # of each point"
 
 
 def place_lines(contents: Contents, vehicle: str, frame: str, sensor: str) -> Iterator[str]:

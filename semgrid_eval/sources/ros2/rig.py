@@ -1,13 +1,14 @@
 """One camera of a bag: its calibration, and frames of the log made of its messages."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_eval.errors import InputError, located
+from semgrid_eval.geometry import CAMERA_FROM_OPTICAL
 from semgrid_eval.recording.colour import ImageSize
 from semgrid_eval.recording.disparity import LARGEST_PX, coded_disparity
 from semgrid_eval.recording.png import encode, encode_gray
@@ -15,11 +16,10 @@ from semgrid_eval.recording.types import CameraCalibration, CameraFrame
 from semgrid_eval.sources.matching import SemiGlobalMatching
 from semgrid_eval.sources.rectification import baseline_m
 from semgrid_eval.sources.ros2 import pictures
-from semgrid_eval.sources.ros2.cameras import Info, calibration_of, rectification_of
+from semgrid_eval.sources.ros2.cameras import Info, rectification_of
 from semgrid_eval.sources.ros2.labels import LabelTable
-from semgrid_eval.sources.ros2.mapping import CameraMap, Extrinsics, VehicleMap
+from semgrid_eval.sources.ros2.mapping import CameraMap, VehicleMap
 from semgrid_eval.sources.ros2.scan import Facts
-from semgrid_eval.sources.ros2.transforms import extrinsics_of
 
 _FOCAL_SHARE, _BASELINE_SHARE = 1e-3, 1e-2  # by which a DisparityImage may differ from the calibration
 Disparity = NDArray[np.float32]
@@ -57,7 +57,7 @@ def plan_rig(camera: CameraMap, vehicle: VehicleMap, facts: Facts) -> RigPlan:
     with located(field=camera.info):
         projection = info.projection(rectified=camera.rectified)
         baseline = _baseline(camera, facts, projection, right_info)
-    calibration = calibration_of(projection, baseline, _place(camera, vehicle, facts))
+    calibration = _calibration(camera, vehicle, facts, projection, baseline)
     if camera.disparity is not None:
         _require_agreement(facts, camera.disparity, calibration)
     return RigPlan(camera, calibration, info, right_info)
@@ -135,12 +135,17 @@ def _baseline(
     return facts.stereo[camera.disparity].baseline_m
 
 
-def _place(camera: CameraMap, vehicle: VehicleMap, facts: Facts) -> Extrinsics:
-    place = camera.extrinsics
-    if place is None:
+def _calibration(
+    camera: CameraMap, vehicle: VehicleMap, facts: Facts, projection: NDArray[np.float64], baseline: float | None
+) -> CameraCalibration:
+    """Put a calibration together; extrinsics of the map stand in it as they are."""
+    if camera.extrinsics is None:
         frame = camera.frame or facts.frames[camera.image or camera.main_topic]
-        place = extrinsics_of(facts.transforms.lookup(vehicle.frame, frame))
-    return place.model_copy(update={"x_m": place.x_m + vehicle.rear_axle_m, "z_m": place.z_m + vehicle.height_m})
+        found = CameraCalibration.of(projection, facts.transforms.lookup(vehicle.frame, frame), baseline)
+    else:
+        found = CameraCalibration.of(projection, CAMERA_FROM_OPTICAL, baseline)
+        found = replace(found, **camera.extrinsics.model_dump())
+    return replace(found, x_m=found.x_m + vehicle.rear_axle_m, z_m=found.z_m + vehicle.height_m)
 
 
 def _require_size(facts: Facts, topic: str, info: Info, told_by: str | None) -> None:

@@ -7,8 +7,7 @@ import numpy as np
 
 from semgrid_eval import geometry
 from semgrid_eval.errors import InputError
-from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
-from semgrid_eval.sources.ros2.mapping import Extrinsics
+from semgrid_eval.geometry import SE3
 
 _STILL_M, _STILL = 1e-3, 1e-3  # how much a link may change, its rotation in elements of the matrix (about radians)
 
@@ -77,14 +76,6 @@ class Transforms:
                         ways[end] = [*ways[here], (key, forward)]
                         waiting.append(end)
         return ways.get(child)
-
-
-def extrinsics_of(vehicle_from_optical: SE3) -> Extrinsics:
-    """Return place and angles of a camera whose optical frame is there: R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    vehicle_from_camera = vehicle_from_optical @ CAMERA_FROM_OPTICAL.inverse()
-    roll_rad, pitch_rad, yaw_rad = geometry.roll_pitch_yaw_of(vehicle_from_camera.rotation)
-    x_m, y_m, z_m = vehicle_from_camera.translation_m.tolist()
-    return Extrinsics(x_m=x_m, y_m=y_m, z_m=z_m, roll_rad=roll_rad, pitch_rad=pitch_rad, yaw_rad=yaw_rad)
 
 
 def rotation_of(quaternion: Any) -> np.ndarray[Any, np.dtype[np.float64]]:  # noqa: ANN401

@@ -54,8 +54,7 @@ def convert_benchmark(benchmark: Benchmark, size: SizeName, out: Path, work: Wor
         with work.stage("compare") as progress:
             found = fingerprints(logs, executor=local_executor(work.workers), progress=progress)
         comparison = compare(benchmark.sizes[size], dict(zip(labels, found, strict=True)))
-    made_with = benchmark.sizes[size].versions
-    summary.remark = _verdict(f"{benchmark.name} {size}", comparison, len(summary.labels), made_with)
+    _judge(summary, f"{benchmark.name} {size}", comparison, benchmark.sizes[size].versions)
     return summary
 
 
@@ -88,17 +87,24 @@ def versions() -> dict[str, str]:
     return dict(sorted((own | installed_versions(_PACKAGES)).items()))
 
 
-def _verdict(name: str, comparison: Comparison | None, total: int, made_with: Mapping[str, str]) -> str:
-    """Say in one line whether the recordings are the published ones."""
+def _judge(summary: ConversionSummary, name: str, comparison: Comparison | None, made_with: Mapping[str, str]) -> None:
+    """Note in one line whether the recordings are the published ones, as a warning where they are not."""
     if comparison is None:
-        return f"Warning: {name}: not compared with what is published, since recordings failed"
-    if comparison.published is None:
-        return f"{name}: digest {comparison.digest}; nothing is published yet to compare it with"
-    if comparison.digest == comparison.published:
-        return f"{name}: digest {comparison.digest}, as published"
-    others = ", ".join(f"{what} {theirs} (here {ours})" for what, (theirs, ours) in changed_versions(made_with).items())
-    why = f"published were made with {others}" if others else "the versions are the same, so processors differ"
-    return (
-        f"Warning: {name}: {len(comparison.differing)} of {total} recordings differ from the published ones, such as "
-        f"{comparison.differing[0]}; digest {comparison.digest}, published {comparison.published}; {why}"
-    )
+        summary.warning = f"{name}: not compared with what is published, since recordings failed"
+    elif comparison.published is None:
+        summary.remark = f"{name}: digest {comparison.digest}; nothing is published yet to compare it with"
+    elif comparison.digest == comparison.published:
+        summary.remark = f"{name}: digest {comparison.digest}, as published"
+    else:
+        summary.warning = (
+            f"{name}: {len(comparison.differing)} of {len(summary.labels)} recordings differ from the published ones, "
+            f"such as {comparison.differing[0]}; digest {comparison.digest}, published {comparison.published}; "
+            f"{_why(made_with)}"
+        )
+
+
+def _why(made_with: Mapping[str, str]) -> str:
+    """Say why recordings may differ from published ones."""
+    changes = changed_versions(made_with).items()
+    others = ", ".join(f"{what} {theirs} (here {ours})" for what, (theirs, ours) in changes)
+    return f"published were made with {others}" if others else "the versions are the same, so processors differ"

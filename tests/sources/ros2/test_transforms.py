@@ -5,19 +5,11 @@ from hypothesis import strategies as st
 from support.ros_messages import transforms
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.geometry import CAMERA_FROM_OPTICAL, SE3
-from semgrid_eval.sources.ros2.transforms import Transforms, extrinsics_of
+from semgrid_eval.geometry import SE3
+from semgrid_eval.sources.ros2.transforms import Transforms
 
 ANGLE = st.floats(-0.7, 0.7)
 PLACE = st.tuples(*[st.floats(-3, 3)] * 3)
-
-
-@given(ANGLE, ANGLE, ANGLE, PLACE)
-def test_mounting_angles_come_back(roll, pitch, yaw, place):
-    vehicle_from_camera = SE3.from_roll_pitch_yaw(roll, pitch, yaw, place)
-    found = extrinsics_of(vehicle_from_camera @ CAMERA_FROM_OPTICAL)
-    assert (found.roll_rad, found.pitch_rad, found.yaw_rad) == pytest.approx((roll, pitch, yaw), abs=1e-9)
-    assert (found.x_m, found.y_m, found.z_m) == pytest.approx(place, abs=1e-12)
 
 
 @given(ANGLE, ANGLE, PLACE, PLACE)
