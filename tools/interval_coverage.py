@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.report.estimates.bootstrap import interval_of, recording_weights, stretched
+from semgrid_eval.report.estimates.bootstrap import recording_weights
 from semgrid_eval.report.estimates.division import EVERYWHERE, row_sums
+from semgrid_eval.report.estimates.intervals import intervals_of, stretched
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.metrics.table import IOU
 
@@ -73,8 +74,9 @@ def misses(world: World, truth: float, recordings: int, trials: int) -> Iterator
         units = int((sums[:, 0] > 0).sum())
         if units < 2:  # there is no interval
             continue
-        draws, value = figure(recording_weights(recordings, generator, draws=DRAWS) @ sums), float(figure(sums.sum(0)))
-        short, long = interval_of(value, draws), interval_of(value, stretched(draws, units))
+        draws = figure(recording_weights(recordings, generator, draws=DRAWS) @ sums)[:, None]
+        both = np.hstack([draws, stretched(draws, np.array([units]))])
+        short, long = intervals_of([float(figure(sums.sum(0)))] * 2, both)
         yield truth < short.low, truth > short.high, truth < long.low, truth > long.high
 
 

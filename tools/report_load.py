@@ -38,8 +38,9 @@ def main() -> None:
     start_s = time.perf_counter()
     command = "import sys; from pathlib import Path; from semgrid_eval.report.page.write import write_report; "
     subprocess.run([sys.executable, "-c", command + "write_report(Path(sys.argv[1]))", options.run], check=True)
-    seconds, memory_kib = time.perf_counter() - start_s, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    sys.stdout.write(f"{seconds:.1f} s, {memory_kib / 2**10:.0f} MiB\n")
+    seconds, used = time.perf_counter() - start_s, resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu_s = used.ru_utime + used.ru_stime
+    sys.stdout.write(f"{seconds:.1f} s by the clock, {cpu_s:.1f} s CPU, {used.ru_maxrss / 2**10:.0f} MiB\n")
 
 
 def make_run(run: Path, rows: int, repeats: int, windows: int) -> None:

@@ -9,8 +9,9 @@ from semgrid_eval.config import parse_config
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.network import TrainingConfig
 from semgrid_eval.report.claims.claims import in_paper
-from semgrid_eval.report.estimates.bootstrap import Estimate, Resampling, RowScores, score_regions
+from semgrid_eval.report.estimates.bootstrap import Resampling, RowScores, score_regions
 from semgrid_eval.report.estimates.division import EVERYWHERE
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.load import Row as ReadRow
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.runs.matrix import Matrix, load_matrix

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from semgrid_eval.report.claims.claims import MARGIN, WINDOW_MS, Check, Claim, Rule, claims, has_papers_classes
-from semgrid_eval.report.estimates.bootstrap import Estimate, Scores, weighted_sum
+from semgrid_eval.report.estimates.bootstrap import Scores, weighted_sum
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.load import Run
 from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase
 from semgrid_eval.report.tables.table import Cell, Line, Table, difference_cell, plain_table

@@ -15,13 +15,21 @@ from numpy.typing import NDArray
 from semgrid_eval.classes import DEFAULT_CLASSES, ClassSet
 from semgrid_eval.errors import InputError
 from semgrid_eval.report.estimates.division import EVERYWHERE, Division, RowSums, row_sums
-from semgrid_eval.report.estimates.student import stretch
+from semgrid_eval.report.estimates.intervals import Estimate, intervals_of, stretched
 from semgrid_eval.report.rows.load import Result, Row, comparable
 from semgrid_eval.scores.metrics.iou import Iou
-from semgrid_eval.scores.metrics.metric import Counts, Floats, Metric, column_names, column_of, divided, mean_finite
+from semgrid_eval.scores.metrics.metric import (
+    Counts,
+    Floats,
+    Metric,
+    column_names,
+    column_of,
+    divided,
+    mean_finite,
+    places_of,
+)
 from semgrid_eval.scores.metrics.table import IOU, metrics_of
 
-LEVEL = 0.95
 Level = Literal["recordings", "groups"]
 
 DRAWS = 1000
@@ -55,6 +63,8 @@ class Draws:
 
     def over_seeds(self, values: Floats) -> Floats:
         """Take the mean over the seeds that each resample picked: (B, S, Q) -> (B, Q)."""
+        if values.shape[1] == 1:  # which is picked once in each
+            return values[:, 0]
         present = np.isfinite(values) * self.picks[values.shape[1]][:, :, None]
         total, number = (present * np.nan_to_num(values)).sum(axis=1), present.sum(axis=1)
         return divided(total, number)
@@ -105,15 +115,6 @@ def group_weights(groups: Sequence[str], generator: np.random.Generator, *, draw
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """A value with its interval; NaN where there is none."""
-
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
 class RowScores:
     """Figures of one row in one region."""
 
@@ -142,9 +143,22 @@ class RowScores:
         """The cells behind each column, in one result."""
         return dict(zip(column_names(self.metric), self.metric.cells(self.totals[0]).tolist(), strict=True))
 
+    def draws_of(self, columns: Sequence[str]) -> Floats:
+        """Return the draws of some columns, in their order."""
+        return self.draws[:, places_of(self.metric, columns)]
+
+    @cached_property
+    def estimates(self) -> Mapping[str, Estimate]:
+        """The mean over seeds of each column with its interval."""
+        return weighted_sums([(1, self)], column_names(self.metric))
+
     def estimate(self, column: str) -> Estimate:
         """Return a column's mean over seeds with its interval."""
-        return weighted_sum([(1, self)], column)
+        return self.estimates[column]
+
+    def differences(self, other: "RowScores") -> dict[str, Estimate]:
+        """Return the paired differences of all columns; a ValueError says that the other is scored on other cells."""
+        return weighted_sums([(1, self), (-1, other)], column_names(self.metric))
 
     def minus(self, other: "RowScores", column: str) -> Estimate:
         """Return the paired difference to another row; a ValueError says that it is scored on other cells."""
@@ -161,20 +175,25 @@ Everything = Mapping[str, Mapping[str, Parts]]
 
 def weighted_sum(parts: Sequence[tuple[float, RowScores]], column: str) -> Estimate:
     """Add up rows' scores by their weights, draw by draw; a ValueError says that they are scored on other cells."""
+    return weighted_sums(parts, [column])[column]
+
+
+def weighted_sums(parts: Sequence[tuple[float, RowScores]], columns: Sequence[str]) -> dict[str, Estimate]:
+    """Add up several columns of rows' scores likewise."""
     first = parts[0][1]
     for _, entry in parts:
         if not comparable(first.row, entry.row) or first.cells_key != entry.cells_key:
             raise ValueError(f"{first.row.name} and {entry.row.name} are scored on other targets or cells")
-    at = column_names(first.metric).index(column)
-    value = sum(weight * entry.mean[column] for weight, entry in parts)
-    draws = np.sum([weight * entry.draws[:, at] for weight, entry in parts], axis=0)
-    units = fewest_units([entry for _, entry in parts], column)
-    return interval_of(value, stretched(draws, units), _limits(parts, column))
+    values = [sum(weight * entry.mean[column] for weight, entry in parts) for column in columns]
+    draws = np.sum([weight * entry.draws_of(columns) for weight, entry in parts], axis=0)
+    units = fewest_units([entry for _, entry in parts], columns)
+    limits = [_limits(parts, column) for column in columns]
+    return dict(zip(columns, intervals_of(values, stretched(draws, units), limits), strict=True))
 
 
-def fewest_units(entries: Sequence[RowScores], column: str) -> int:
-    """Count the recordings, or groups, that have cells behind a column, of the row that has fewest of them."""
-    return min(int(entry.units[column_names(entry.metric).index(column)]) for entry in entries)
+def fewest_units(entries: Sequence[RowScores], columns: Sequence[str]) -> Counts:
+    """Count the recordings, or groups, that have cells behind each column, of the row that has fewest: (Q,)."""
+    return np.asarray(np.min([entry.units[places_of(entry.metric, columns)] for entry in entries], axis=0))
 
 
 def _limits(parts: Sequence[tuple[float, RowScores]], column: str) -> tuple[float, float]:
@@ -182,27 +201,6 @@ def _limits(parts: Sequence[tuple[float, RowScores]], column: str) -> tuple[floa
     ends = column_of(parts[0][1].metric, column).limits
     lowest, highest = (sum(pick(weight * end for end in ends) for weight, _ in parts) for pick in (min, max))
     return lowest, highest
-
-
-def stretched(draws: Floats, units: int) -> Floats:
-    """Move draws (B,) away from their middle until their interval is long enough for `units` recordings or groups.
-
-    Where one alone has something to count, it says nothing about others: no draw is left.
-    """
-    finite = draws[np.isfinite(draws)]
-    if units < 2 or not len(finite):
-        return draws[:0]
-    middle = np.median(finite)
-    return np.asarray(middle + stretch(units, LEVEL) * (draws - middle))
-
-
-def interval_of(value: float, draws: Floats, limits: tuple[float, float] = (-np.inf, np.inf)) -> Estimate:
-    """Give a value the interval of its draws (B,), of those that are finite, within limits."""
-    finite = draws[np.isfinite(draws)]
-    if not np.isfinite(value) or not len(finite):
-        return Estimate(value, np.nan, np.nan)
-    low, high = np.quantile(finite, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]).clip(*limits)
-    return Estimate(value, float(low), float(high))
 
 
 def score_all(rows: Sequence[Row], divisions: Sequence[Division], resampling: Resampling) -> Everything:

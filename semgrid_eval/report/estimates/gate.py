@@ -10,8 +10,9 @@ from pathlib import Path
 from semgrid_eval.errors import InputError
 from semgrid_eval.faults import meant, not_one_of
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.report.estimates.bootstrap import SEED, Estimate, Level, Resampling, Scores, classes_of, score_regions
+from semgrid_eval.report.estimates.bootstrap import SEED, Level, Resampling, Scores, classes_of, score_regions
 from semgrid_eval.report.estimates.division import EVERYWHERE
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.load import Row, Run, comparable, load_runs
 from semgrid_eval.report.rows.pairing import changed_targets, settings_of
 from semgrid_eval.scores import results

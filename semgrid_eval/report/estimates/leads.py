@@ -5,18 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from semgrid_eval.report.estimates.bootstrap import (
-    Estimate,
-    RowScores,
-    Scores,
-    fewest_units,
-    interval_of,
-    shared_iou,
-    stretched,
-)
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, fewest_units, shared_iou
+from semgrid_eval.report.estimates.intervals import Estimate, intervals_of, stretched
 from semgrid_eval.report.estimates.streams import facts_of
 from semgrid_eval.report.rows.pairing import settings_but
-from semgrid_eval.scores.metrics.metric import column_names
 
 
 @dataclass(frozen=True)
@@ -33,13 +25,13 @@ class LeadSeries:
     def best(self, column: str) -> tuple[RowScores, Estimate]:
         """Return the row with the highest value, and its lead in ms; the interval is that of the best lead by draw."""
         values = np.array([entry.mean[column] for entry in self.entries])
-        at = column_names(self.entries[0].metric).index(column)
-        units = fewest_units(self.entries, column)
-        draws = np.stack([stretched(entry.draws[:, at], units) for entry in self.entries])  # (L, B)
         chosen = self.entries[int(np.nanargmax(values))] if np.isfinite(values).any() else self.entries[0]
-        return chosen, interval_of(
-            lead_of(chosen), np.array(self.leads_ms)[np.nan_to_num(draws, nan=-np.inf).argmax(axis=0)]
-        )
+        draws = np.hstack([entry.draws_of([column]) for entry in self.entries])  # (B, L)
+        units = fewest_units(self.entries, [column]).repeat(len(self.entries))
+        likely = stretched(draws, units)
+        leads_ms = np.array(self.leads_ms)[np.nan_to_num(likely, nan=-np.inf).argmax(axis=1)]
+        known = np.isfinite(likely).any(axis=1)
+        return chosen, intervals_of([lead_of(chosen)], leads_ms[known, None])[0]
 
 
 def lead_of(entry: RowScores) -> float:

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
 from semgrid_eval.report.estimates.division import Division, of_windows
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.load import Result, Row, Run
 from semgrid_eval.report.rows.pairing import settings_but
 from semgrid_eval.scores.facts import StreamFacts, StreamRecord

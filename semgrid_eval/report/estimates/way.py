@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores, fewest_units, interval_of, stretched
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, fewest_units
+from semgrid_eval.report.estimates.intervals import Estimate, intervals_of, stretched
 from semgrid_eval.report.rows.load import Result, Row
 from semgrid_eval.report.rows.pairing import HEADLINE, way_of
-from semgrid_eval.scores.metrics.metric import column_names
 
 
 @dataclass(frozen=True)
@@ -20,16 +20,21 @@ class Way:
 
     def share(self, entry: RowScores, column: str) -> Estimate:
         """Return (row - lower) / (upper - lower), all resampled together; NaN where there is no way to go."""
-        at = column_names(entry.metric).index(column)
-        low, high = self.lower.mean[column], self.upper.mean[column]
-        nothing = Estimate(np.nan, np.nan, np.nan)
-        if not high > low:
-            return nothing
-        length = self.upper.draws[:, at] - self.lower.draws[:, at]
-        covered = np.where(length > 0, entry.draws[:, at] - self.lower.draws[:, at], np.nan)
+        return self.shares(entry, [column])[column]
+
+    def shares(self, entry: RowScores, columns: Sequence[str]) -> dict[str, Estimate]:
+        """Return the shares of several columns."""
+        values = [_share(entry.mean[name], self.lower.mean[name], self.upper.mean[name]) for name in columns]
+        lower, upper = self.lower.draws_of(columns), self.upper.draws_of(columns)
+        length = upper - lower
+        covered = np.where(length > 0, entry.draws_of(columns) - lower, np.nan)
         shares = covered / np.where(length > 0, length, 1.0)
-        units = fewest_units([self.lower, self.upper, entry], column)
-        return interval_of((entry.mean[column] - low) / (high - low), stretched(shares, units))
+        units = fewest_units([self.lower, self.upper, entry], columns)
+        return dict(zip(columns, intervals_of(values, stretched(shares, units)), strict=True))
+
+
+def _share(value: float, low: float, high: float) -> float:
+    return (value - low) / (high - low) if high > low else np.nan
 
 
 def ways(scores: Scores, rows: Sequence[Row] = ()) -> Iterator[tuple[RowScores, Way]]:

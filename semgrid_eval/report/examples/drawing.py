@@ -4,6 +4,7 @@ import base64
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ RIGHT_LABELS = ("unknown in all", "both right", "only the model right", "only th
 SHARE_ENDS = ((255, 244, 214), (122, 4, 3))
 """Colours of no share and of the highest one."""
 _CERTAINTY_LEVELS, _SHARE_LEVELS = 16, 15
+_KEPT_PICTURES = 256
 _SMALL_PALETTE = 16  # colours of a picture of four bits
 _HATCH_SCALE, _HATCH_STEP = 3, 11  # pixels of an edge of a cell, and from line to line
 
@@ -160,8 +162,14 @@ def _in_class_colours(shown: Grid, classes: ClassSet) -> tuple[str, frozenset[in
 
 
 def _png(indices: Grid, palette: NDArray[np.uint8], *, bits: int = 4, clear: int | None = None) -> bytes:
-    picture = Image.frombytes("P", indices.shape[::-1], indices.tobytes())  # width, height
-    picture.putpalette(palette.tobytes())
+    return _encoded(indices.tobytes(), indices.shape, palette.tobytes(), bits, clear)
+
+
+@lru_cache(maxsize=_KEPT_PICTURES)
+def _encoded(indices: bytes, shape: tuple[int, int], palette: bytes, bits: int, clear: int | None) -> bytes:
+    """Encode a picture; a page shows many of them several times."""
+    picture = Image.frombytes("P", shape[::-1], indices)  # width, height
+    picture.putpalette(palette)
     stream = io.BytesIO()
     transparent = {} if clear is None else {"transparency": clear}
     picture.save(stream, "PNG", bits=bits, optimize=True, **transparent)

@@ -10,14 +10,8 @@ from semgrid_eval import __version__
 from semgrid_eval.files import write_json, write_text
 from semgrid_eval.report.claims.claims import scaling
 from semgrid_eval.report.claims.findings import finding_frame, finding_records
-from semgrid_eval.report.estimates.bootstrap import (
-    LEVEL,
-    Estimate,
-    Everything,
-    RowScores,
-    Scores,
-    everywhere,
-)
+from semgrid_eval.report.estimates.bootstrap import Everything, RowScores, Scores, everywhere
+from semgrid_eval.report.estimates.intervals import LEVEL, Estimate
 from semgrid_eval.report.estimates.way import Way, ways
 from semgrid_eval.report.figures.curves import calibration_frame, timing_frame, training_frame
 from semgrid_eval.report.figures.settings import settings_frame
@@ -191,20 +185,20 @@ def _region_records(scores: Scores, rows: Sequence[Row]) -> dict[str, dict[str, 
 
 
 def _record(entry: RowScores, scores: Scores, rows: Sequence[Row], way: Way | None) -> dict[str, Any]:
-    other, columns = reference_scores(entry, scores, rows), column_names(entry.metric)
+    other = reference_scores(entry, scores, rows)
     return {
         "windows": entry.windows,
         "seeds": len(entry.results),
         "cells": entry.cells,
-        "scores": {column: _estimate(entry.estimate(column)) for column in columns},
+        "scores": _estimates(entry.estimates),
         "reference": None if other is None else other.row.name,
-        "differences": {} if other is None else {column: _estimate(entry.minus(other, column)) for column in columns},
-        "shares": {} if way is None else {column: _estimate(way.share(entry, column)) for column in columns},
+        "differences": {} if other is None else _estimates(entry.differences(other)),
+        "shares": {} if way is None else _estimates(way.shares(entry, column_names(entry.metric))),
     }
 
 
-def _estimate(estimate: Estimate) -> dict[str, float | None]:
-    return {name: finite(value) for name, value in vars(estimate).items()}
+def _estimates(found: Mapping[str, Estimate]) -> dict[str, dict[str, float | None]]:
+    return {column: {name: finite(value) for name, value in vars(each).items()} for column, each in found.items()}
 
 
 def _seeds(entry: RowScores, place: dict[str, str]) -> Iterator[dict[str, Any]]:

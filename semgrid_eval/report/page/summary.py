@@ -7,7 +7,8 @@ from math import isfinite
 from markupsafe import Markup
 
 from semgrid_eval.errors import printable
-from semgrid_eval.report.estimates.bootstrap import Estimate, Scores, shared_iou
+from semgrid_eval.report.estimates.bootstrap import Scores, shared_iou
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.estimates.streams import Strategy
 from semgrid_eval.report.rows.load import Row, Run, comparable, key_of
 from semgrid_eval.report.rows.pairing import HEADLINE, VERDICTS, Headline, verdict

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from semgrid_eval.classes import MEAN_KNOWN
-from semgrid_eval.report.estimates.bootstrap import Estimate, Scores
+from semgrid_eval.report.estimates.bootstrap import Scores
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.load import Row, comparable, key_of
 
 HEADLINE = MEAN_KNOWN

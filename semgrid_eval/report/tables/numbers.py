@@ -2,7 +2,7 @@
 
 import math
 
-from semgrid_eval.report.estimates.bootstrap import LEVEL, Estimate
+from semgrid_eval.report.estimates.intervals import LEVEL, Estimate
 
 ABSENT = "\N{EN DASH}"
 MINUS = "\N{MINUS SIGN}"

@@ -3,7 +3,8 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores, shared_iou
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, shared_iou
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.estimates.leads import LeadSeries
 from semgrid_eval.report.estimates.streams import Strategy, facts_of, pairs_with, plain_strategy, record_of, won_ms
 from semgrid_eval.report.rows.pairing import HEADLINE, VERDICTS, verdict

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from semgrid_eval.errors import printable
-from semgrid_eval.report.estimates.bootstrap import Estimate
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.pairing import verdict
 from semgrid_eval.report.tables.numbers import finite, interval, number, signed
 from semgrid_eval.scores.metrics.metric import Better

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from semgrid_eval.report.claims.claims import paper_table
-from semgrid_eval.report.estimates.bootstrap import Estimate, RowScores, Scores
+from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.load import Row
 from semgrid_eval.report.rows.pairing import reference_of, verdict
 from semgrid_eval.report.tables.numbers import ABSENT, MINUS, finite, interval_phrase, number, signed

@@ -111,9 +111,15 @@ def column_names(metric: Metric) -> tuple[str, ...]:
     return tuple(column.name for column in metric.columns)
 
 
+def places_of(metric: Metric, names: Sequence[str]) -> list[int]:
+    """Find the places of figures among a metric's columns."""
+    known = column_names(metric)
+    return [known.index(name) for name in names]
+
+
 def column_of(metric: Metric, name: str) -> Column:
     """Find a metric's figure by its name."""
-    return metric.columns[column_names(metric).index(name)]
+    return next(column for column in metric.columns if column.name == name)
 
 
 def divided(part: NDArray[np.number], whole: Counts) -> Floats:

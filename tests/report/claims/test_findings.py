@@ -21,8 +21,9 @@ from semgrid_eval.report.claims.findings import (
     missing_table,
     sentence,
 )
-from semgrid_eval.report.estimates.bootstrap import Estimate, Resampling, score_regions
+from semgrid_eval.report.estimates.bootstrap import Resampling, score_regions
 from semgrid_eval.report.estimates.division import of_cells
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.load import Run, load_runs
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.scores.metrics.table import IOU

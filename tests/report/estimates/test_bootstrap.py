@@ -6,16 +6,9 @@ from support.fake_run import counted_row, make_fake_run, reader
 from support.scoring import score_rows
 
 from semgrid_eval.classes import CLASS_NAMES
-from semgrid_eval.report.estimates.bootstrap import (
-    LEVEL,
-    Estimate,
-    Resampling,
-    RowScores,
-    comparable,
-    recording_weights,
-    score_regions,
-)
+from semgrid_eval.report.estimates.bootstrap import Resampling, RowScores, comparable, recording_weights, score_regions
 from semgrid_eval.report.estimates.division import EVERYWHERE, of_cells
+from semgrid_eval.report.estimates.intervals import LEVEL, Estimate
 from semgrid_eval.report.estimates.student import stretch
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.report.rows.pairing import verdict

@@ -5,9 +5,10 @@ import pytest
 from support.fake_run import FakeRow, counted_row, make_fake_run
 
 from semgrid_eval.errors import InputError
-from semgrid_eval.report.estimates.bootstrap import SEED, Estimate, Resampling, everywhere, score_all
+from semgrid_eval.report.estimates.bootstrap import SEED, Resampling, everywhere, score_all
 from semgrid_eval.report.estimates.division import EVERYWHERE
 from semgrid_eval.report.estimates.gate import Gate, Limit, Verdict, check_gate, hold, parse_limit
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.metrics.table import IOU
 

@@ -9,7 +9,7 @@ import pytest
 from support.fake_run import counted_row, reader
 from support.scoring import score_rows
 
-from semgrid_eval.report.estimates.bootstrap import Estimate
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.estimates.way import Order, against_expected, order_of, ways
 from semgrid_eval.report.figures.categories import category_plots, lay_out
 from semgrid_eval.report.page.write import write_report

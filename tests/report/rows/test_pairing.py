@@ -6,7 +6,7 @@ import pytest
 from support.fake_run import FakeRow, counted_row, make_fake_run
 from support.scoring import score_rows
 
-from semgrid_eval.report.estimates.bootstrap import Estimate
+from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.page.provenance import failures
 from semgrid_eval.report.page.summary import summarise, title_of
 from semgrid_eval.report.rows.load import Run, load_runs
