@@ -12,6 +12,7 @@ from semgrid_eval.models.model import Given
 from semgrid_eval.models.network import Constants, Network, NetworkSettings, input_planes
 from semgrid_eval.models.prior import CellPrior
 from semgrid_eval.windows.data import WindowBatch, WindowSet
+from semgrid_eval.words import plural
 
 Activation = Literal["linear", "relu"]
 DROPOUT_RATE = 0.5
@@ -67,7 +68,8 @@ class EncoderDecoder(Network):
     @classmethod
     def in_words(cls, settings: EncoderDecoderSettings) -> str:
         """Say what the model does."""
-        return f"encoder-decoder d {settings.depth}, f {settings.features}" + ", over a table" * settings.prior
+        size = f"depth {settings.depth}, {plural(settings.features, 'feature')}"
+        return f"encoder-decoder of {size}" + ", over a table" * settings.prior
 
     @classmethod
     def check(cls, settings: EncoderDecoderSettings, given: Given) -> None:

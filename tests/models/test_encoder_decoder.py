@@ -125,7 +125,7 @@ def test_same_seed_gives_same_weights_and_leaves_the_global_generator_alone():
 
 
 def test_label_says_its_depth_and_features():
-    assert EncoderDecoder.in_words(EncoderDecoderSettings(features=8)) == "encoder-decoder d 3, f 8"
+    assert EncoderDecoder.in_words(EncoderDecoderSettings(features=8)) == "encoder-decoder of depth 3, 8 features"
 
 
 def test_impossible_configurations_are_refused():

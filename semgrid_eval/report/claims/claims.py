@@ -170,7 +170,7 @@ PAPER_SETTINGS = {
     "settings.training.epochs": ("epochs", 40),
     "settings.training.updates_per_epoch": ("updates an epoch", 185),
     "settings.training.schedule.learning_rate": ("learning rate", 1e-3),
-    "settings.training.schedule.drop_epoch": ("learning rate dropped after epoch", 35),
+    "settings.training.schedule.drop_epoch": ("epoch after which the learning rate drops", 35),
     "settings.training.schedule.rate_after_drop": ("learning rate then", 1e-4),
 }
 """What the supplement says of network and training: words and value by a result's setting."""

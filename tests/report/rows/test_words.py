@@ -14,7 +14,8 @@ def _row(name="ED-DC", words="", **facts):
 
 
 def test_models_are_told_apart_by_what_they_do_and_by_whether_their_grids_are_moved():
-    assert model_words(_row(words="encoder-decoder d 3, f 32")) == "encoder-decoder d 3, f 32"
+    words = "encoder-decoder of depth 3, 32 features"
+    assert model_words(_row(words=words)) == words
     still = _row(words="newest input", translate=False)
     assert model_words(still) == "newest input, inputs not moved to the target's time"
     stream = StreamFacts(words="", added_ms=0, measured=True, moved=False, asked="capture", model_is_free=False)
