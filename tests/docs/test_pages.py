@@ -25,7 +25,8 @@ LINES = sorted(line for line in SHOWN if line.startswith("semgrid-eval ") and "-
 MORE = [ROOT / name for name in ("ARCHITECTURE.md", "CONTRIBUTING.md", "reports/README.md")]
 TAKEN_AS_GIVEN = (
     "SRC PREDICTIONS TREE/pred_sequence LOGS/val RUN logs/val drives/val recordings town runs/first runs/stream "
-    "runs/before runs/after runs/own runs/paper/trainings back/run/trainings drive labelled runs/drive cityscapes"
+    "runs/before runs/after runs/own runs/paper/trainings back/run/trainings drive labelled runs/drive cityscapes "
+    "varied real town-v1 varied-town/trainings"
 )
 
 
