@@ -18,11 +18,14 @@ from semgrid_eval.files import read_json
 
 PATIENCE_S = 200.0  # a third of what is to be broken off: a machine may be busy, or stand still for a while
 BUSY_PARENT = """
+import signal
 import sys
 from pathlib import Path
 
 from semgrid_eval.executors import Processes
 from support.pieces import write_ten_minutes
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets what it puts in the background ignore it
 
 def work():
     for _ in Processes(2).run(write_ten_minutes, [Path(name) for name in sys.argv[1:]]):
