@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.small_runs import run, write_logs
+from support.small_runs import run
 
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.executors import InProcess
@@ -28,11 +28,6 @@ ROWS = [{"name": name, "model": model} for name, model in MODELS.items()] + [
     for kind, disturb in KINDS.items()
     for name in (("BL", "ED") if kind in ("lost", "late") else ("BL",))
 ]
-
-
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory):
-    return write_logs(tmp_path_factory.mktemp("logs"))
 
 
 @pytest.fixture(scope="module")

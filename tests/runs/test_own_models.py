@@ -3,31 +3,16 @@
 import importlib.metadata
 
 import pytest
-from support.small_runs import run, write_logs
+from support.small_runs import result_of, run
 
 from semgrid_eval.executors import Processes
-from semgrid_eval.models.registry import ENTRY_POINT_GROUP, own_models
+from semgrid_eval.models.registry import ENTRY_POINT_GROUP
 from semgrid_eval.scores import results
 from semgrid_eval.scores.metrics.iou import class_iou
 from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.scores.sums import read_sums
 
-
-@pytest.fixture(autouse=True)
-def here():
-    """Models run in this process, which is quicker; `test_own_models_apart` has what is different in another."""
-    with own_models(None):
-        yield
-
-
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory):
-    return write_logs(tmp_path_factory.mktemp("logs"))
-
-
-def result_of(out, row):
-    assert row.failure is None, row.failure
-    return results.read_result(results.result_folder(out, row.results[0]))
+pytestmark = pytest.mark.usefixtures("own_models_here")
 
 
 def score(out, record, name):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from support.small_runs import run, write_logs
+from support.small_runs import run
 
 from semgrid_eval.executors import Processes
 from semgrid_eval.models.registry import described, own_models
@@ -92,11 +92,6 @@ class Chance(Model):
 """
 TRAINING = {"epochs": 1, "updates_per_epoch": 2, "batch": 2}
 MANY = Limits(memory_bytes=4 << 30)
-
-
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory):
-    return write_logs(tmp_path_factory.mktemp("logs"))
 
 
 @pytest.fixture(autouse=True)

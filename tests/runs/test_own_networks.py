@@ -2,13 +2,15 @@
 
 import pytest
 import torch
-from support.small_runs import run, write_logs
+from support.small_runs import result_of, run
 
 from semgrid_eval.executors import Processes
 from semgrid_eval.models import fitting
 from semgrid_eval.models.registry import own_models
 from semgrid_eval.scores import results
 from semgrid_eval.workplace import Limits
+
+pytestmark = pytest.mark.usefixtures("own_models_here")
 
 NETWORK = """
 import torch
@@ -36,18 +38,6 @@ class Small(Network):
 TRAINING = {"epochs": 2, "updates_per_epoch": 3, "batch": 2}
 
 
-@pytest.fixture(autouse=True)
-def here():
-    """Models run in this process, which is quicker; `test_own_models_apart` has what is different in another."""
-    with own_models(None):
-        yield
-
-
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory):
-    return write_logs(tmp_path_factory.mktemp("logs"))
-
-
 @pytest.fixture
 def small(tmp_path):
     """A network in a file, which imports its neighbour."""
@@ -60,11 +50,6 @@ def small(tmp_path):
 
 def own_row(small, **more):
     return {"name": "own", "model": small, "settings": {"training": TRAINING}, **more}
-
-
-def result_of(out, row):
-    assert row.failure is None, row.failure
-    return results.read_result(results.result_folder(out, row.results[0]))
 
 
 def test_an_own_network_is_trained_like_a_built_in_one(logs, tmp_path, small):

@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from support.small_runs import run, write_logs
+from support.small_runs import run
 from support.toy_world import FRAME_NS, START_NS
 
 import semgrid_eval as sg
@@ -19,11 +19,6 @@ from semgrid_eval.scores.sums import read_sums
 ALL = {"step_frames": 2, "target_frame": None}
 RECORDINGS = ("toy_000002_000000", "toy_000003_000000")
 LATE_MS = 2 * FRAME_NS / 1e6
-
-
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory):
-    return write_logs(tmp_path_factory.mktemp("logs"))
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 import torch
-from support.small_runs import SPLITS, run, write_logs
+from support.small_runs import SPLITS, run
 from support.toy_world import street
 
 from semgrid_eval.classes import CLASS_NAMES
@@ -18,11 +18,6 @@ from semgrid_eval.scores import results
 from semgrid_eval.scores.metrics.iou import class_iou
 from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.scores.sums import read_sums
-
-
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory):
-    return write_logs(tmp_path_factory.mktemp("logs"))
 
 
 def score(out, record, name):

@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from support.small_runs import run, write_logs
+from support.small_runs import run
 
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.executors import Processes
@@ -34,11 +34,6 @@ ROWS = [
         for lead in (59.0, 177.0)
     ),
 ]
-
-
-@pytest.fixture(scope="module", name="logs")
-def logs_fixture(tmp_path_factory):
-    return write_logs(tmp_path_factory.mktemp("logs"))
 
 
 @pytest.fixture(scope="module", name="done")

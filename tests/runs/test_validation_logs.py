@@ -4,17 +4,12 @@ import shutil
 
 import pytest
 import torch
-from support.small_runs import SPLITS, run, write_logs
+from support.small_runs import SPLITS, run
 from support.toy_world import street
 
 from semgrid_eval.executors import InProcess, Processes
 from semgrid_eval.log.store import write_log
 from semgrid_eval.scores import results
-
-
-@pytest.fixture(scope="module")
-def logs(tmp_path_factory):
-    return write_logs(tmp_path_factory.mktemp("logs"))
 
 
 def test_recordings_of_another_frame_rate_are_scored_in_windows_of_their_own(logs, tmp_path):

@@ -7,6 +7,7 @@ from semgrid_eval.executors import InProcess
 from semgrid_eval.log.store import write_log
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.runner import RunOptions, run_matrix
+from semgrid_eval.scores import results
 
 WINDOW = {"step_frames": 3, "target_frame": 8}
 SPLITS = ("train", "train", "val", "val")
@@ -29,3 +30,9 @@ def run(rows, logs, out, executor=None, only=(), *, folders=None, **defaults):
     )
     options = RunOptions("cpu", out.parent / "grids", "test", only, executor or InProcess(), **(folders or {}))
     return run_matrix(load_matrix(str(path)), logs, out, options)
+
+
+def result_of(out, row):
+    """Read the first result of a row that did not fail."""
+    assert row.failure is None, row.failure
+    return results.read_result(results.result_folder(out, row.results[0]))
