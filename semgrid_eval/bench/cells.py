@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_eval.bench.material import Material, PictureSize, pictures_of
+from semgrid_eval.bench.material import Material, pictures_of
 from semgrid_eval.bench.measurement import Measurement, Settings, seconds_passed, times_as_fast, wall_s
 from semgrid_eval.bench.rivals import View, confusion_by_definition, decode_by_opencv, grid_by_arrays
 from semgrid_eval.classes import CLASS_COUNT
@@ -19,6 +19,7 @@ from semgrid_eval.grids.rasterise import add_points, no_points, rasterise
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.topics import DISPARITY, LABEL
+from semgrid_eval.recording.colour import ImageSize
 from semgrid_eval.recording.png import decode_gray
 from semgrid_eval.scores.metrics.iou import confusion
 from semgrid_eval.sensors.camera import CameraSensor
@@ -45,13 +46,13 @@ def measure_grids(material: Material) -> Iterator[Measurement]:
     )
 
 
-def _measure_log(material: Material, size_px: PictureSize) -> Iterator[Measurement]:
+def _measure_log(material: Material, size_px: ImageSize) -> Iterator[Measurement]:
     log, repeats = material.log(size_px), material.settings.repeats
     decode = partial(decode_by_opencv, pictures_of(log, (DISPARITY, LABEL)))
     for config in (GridConfig(sensors={"full": CameraSensor()}), GridConfig()):
         make = partial(build_log, log, config)
         make()  # compiles
-        what = f"{size_px[0]} x {size_px[1]}, {plural(len(config.sensors), 'sensor')}"
+        what = f"{size_px}, {plural(len(config.sensors), 'sensor')}"
         yield Measurement(what, FRAME_COUNT / wall_s(make, repeats), "frames/s")
         taken = 1.0 / times_as_fast(make, decode, repeats)
         yield Measurement(f"{what}, against decoding", taken, "times its time")

@@ -12,6 +12,7 @@ import cv2
 
 from semgrid_eval.bench.material import Material
 from semgrid_eval.bench.measurement import Measurement, processor_s
+from semgrid_eval.recording.colour import ImageSize
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town.config import FRAME_COUNT
 from semgrid_eval.sources.town.kinds import KINDS
@@ -55,7 +56,7 @@ def measure_rendering(material: Material) -> Iterator[Measurement]:
     """Render a recording with each kind of stereo."""
     scale = material.settings.scale
     for stereo, width_px, height_px, at_most_s in _RENDERED:
-        plan = material.plan(stereo, round(width_px * scale), round(height_px * scale))
+        plan = material.plan(stereo, ImageSize(round(width_px * scale), round(height_px * scale)))
         _render(replace(plan, width_px=64, height_px=32))  # loads and compiles what the first rendering needs
         with _one_thread():
             seconds = processor_s(partial(_render, plan), material.settings.repeats)

@@ -6,13 +6,14 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from semgrid_eval.bench.material import Material, PictureSize, pictures_of
+from semgrid_eval.bench.material import Material, pictures_of
 from semgrid_eval.bench.measurement import Measurement, seconds_passed, times_as_fast, wall_s
 from semgrid_eval.bench.rivals import decode_by_opencv, read_by_library
 from semgrid_eval.log.check import check_log
 from semgrid_eval.log.convert import Work
 from semgrid_eval.log.store import read_recording, write_log
 from semgrid_eval.log.topics import PICTURE_FIELDS
+from semgrid_eval.recording.colour import ImageSize
 from semgrid_eval.sources.cityscapes.source import CityscapesOptions
 from semgrid_eval.sources.cityscapes.tree import convert_cityscapes
 
@@ -39,7 +40,7 @@ def measure_logs(material: Material) -> Iterator[Measurement]:
         yield from _measure_log(material, size_px)
 
 
-def _measure_log(material: Material, size_px: PictureSize) -> Iterator[Measurement]:
+def _measure_log(material: Material, size_px: ImageSize) -> Iterator[Measurement]:
     repeats, path, written = material.settings.repeats, material.log(size_px), material.folder / "written.mcap"
     megabytes, recording = path.stat().st_size / _MEGABYTE, material.recording(size_px)
     looked_through = replace(recording, encoded_here=False)  # as if others had made its pictures
@@ -52,7 +53,7 @@ def _measure_log(material: Material, size_px: PictureSize) -> Iterator[Measureme
         ("read", read, 600.0),
         ("checked", check, None),
     )
-    log = f"{size_px[0]} x {size_px[1]}, {megabytes:.1f} MB"
+    log = f"{size_px}, {megabytes:.1f} MB"
     for what, work, at_least in rates:
         yield Measurement(f"{log}, {what}", megabytes / wall_s(work, repeats), "MB/s", at_least=at_least)
     yield Measurement(f"{log}, read, against the MCAP library", times_as_fast(read, library, repeats), "times")

@@ -11,14 +11,13 @@ from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.store import write_log
 from semgrid_eval.motion import MotionSample
 from semgrid_eval.progress import silent
+from semgrid_eval.recording.colour import ImageSize
 from semgrid_eval.recording.types import CameraCalibration, Recording
 from semgrid_eval.sources.benchmarks import Stereo
 from semgrid_eval.sources.town.config import SyntheticConfig
 from semgrid_eval.sources.town.recordings import plan_recordings
 from semgrid_eval.sources.town.rendering import RecordingPlan, render_recording
 
-PictureSize = tuple[int, int]
-"""Width and height."""
 _CITY, _CAMERA = "benchtown", "front"
 
 
@@ -28,38 +27,36 @@ class Material:
     def __init__(self, folder: Path, settings: Settings) -> None:
         self.folder, self.settings = folder, settings
         self.smallest_px = settings.pictures_px[0]
-        self._recordings: dict[PictureSize, Recording] = {}
+        self._recordings: dict[ImageSize, Recording] = {}
 
-    def plan(self, stereo: Stereo, width_px: int, height_px: int) -> RecordingPlan:
+    def plan(self, stereo: Stereo, size_px: ImageSize) -> RecordingPlan:
         """Plan a recording in the town, which is built once."""
         config = SyntheticConfig(
             recordings=1,
             towns=1,
             val_share=0.0,
             stereo=stereo,
-            width=width_px,
-            height=height_px,
+            width=size_px.width,
+            height=size_px.height,
             town_size_m=self.settings.town_size_m,
             duration_s=self.settings.duration_s,
         )
         return plan_recordings(config, self.folder / "towns", silent)[0]
 
-    def recording(self, size_px: PictureSize) -> Recording:
-        """Return a rendered recording of modelled stereo, its frames in memory; its log is made with it."""
+    def recording(self, size_px: ImageSize) -> Recording:
+        """Return a rendered recording of modelled stereo, its frames in memory."""
         if size_px not in self._recordings:
-            recording = render_recording(self.plan("modelled", *size_px))
+            recording = render_recording(self.plan("modelled", size_px))
             moments = tuple(recording.moments())
             self._recordings[size_px] = replace(recording, moments=lambda: iter(moments))
-            write_log(self._recordings[size_px], self._log_place(size_px))
         return self._recordings[size_px]
 
-    def log(self, size_px: PictureSize) -> Path:
+    def log(self, size_px: ImageSize) -> Path:
         """Return the log of that recording."""
-        self.recording(size_px)
-        return self._log_place(size_px)
-
-    def _log_place(self, size_px: PictureSize) -> Path:
-        return self.folder / f"recording-{size_px[0]}.mcap"
+        path = self.folder / f"recording-{size_px.width}.mcap"
+        if not path.exists():
+            write_log(self.recording(size_px), path)
+        return path
 
     @cached_property
     def logs(self) -> list[Path]:

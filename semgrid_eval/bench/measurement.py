@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import median
 
+from semgrid_eval.recording.colour import ImageSize
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -20,13 +22,13 @@ class Settings:
     updates: int = 4  # in each repeat
     windows: int = 64  # that are predicted and scored in each repeat
     matrix_rows: int = 2048  # of the square matrices whose product tells the machine's rate
-    pictures_px: tuple[tuple[int, int], ...] = ((512, 256), (2048, 1024))  # sizes of a camera's pictures in logs
+    pictures_px: tuple[ImageSize, ...] = (ImageSize(512, 256), ImageSize(2048, 1024))  # of cameras in logs
     recordings: int = 16  # whose conversion and grids are shared by `workers`
     workers: int = 2  # processes at once
 
 
 FULL = Settings()
-QUICK = Settings(repeats=1, features=(16,), updates=3, windows=32, pictures_px=((512, 256),), recordings=4)
+QUICK = Settings(repeats=1, features=(16,), updates=3, windows=32, pictures_px=(ImageSize(512, 256),), recordings=4)
 
 
 @dataclass(frozen=True)

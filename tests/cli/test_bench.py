@@ -10,13 +10,14 @@ from semgrid_eval.bench.measurement import Settings
 from semgrid_eval.bench.suite import PARTS
 from semgrid_eval.cli import bench
 from semgrid_eval.cli.main import cli, main
+from semgrid_eval.recording.colour import ImageSize
 
 TINY = Settings(
     repeats=1,
     town_size_m=250.0,
     duration_s=15.0,
     scale=0.125,
-    pictures_px=((64, 32), (128, 64)),
+    pictures_px=(ImageSize(64, 32), ImageSize(128, 64)),
     features=(2,),
     batch=2,
     updates=1,
