@@ -11,7 +11,7 @@ from semgrid_eval.models.residual import ResidualSettings
 from semgrid_eval.presets import preset_names
 from semgrid_eval.runs.matrix import load_matrix
 
-SCALED = ("paper-cpu", "architecture-cpu", "sensitivity")
+SCALED = ("reference", "architecture-cpu", "sensitivity", "updates-cpu")
 TOLD = ("ceiling", "ceiling-PH1", "ceiling-PH2", "ceiling-PH3", "fresh-errors", "true-motion")
 
 
@@ -85,11 +85,12 @@ def test_real_trains_as_paper_cpu_and_scores_windows_that_fit_ten_frames():
         assert row.scored_window.horizon_steps == row.window.horizon_steps
 
 
-def test_cpu_presets_share_the_training_of_paper_cpu():
+def test_presets_for_two_cores_share_the_training_of_reference():
     rows = {f"{name} {row.name}": row for name in SCALED for row in load_matrix(name).rows}
     left_out = {"name", "second_target"}
-    shared = rows["paper-cpu ED-DC"].model_dump(exclude=left_out)
-    assert rows["architecture-cpu ED-d3-f32"].model_dump(exclude=left_out) == shared
+    shared = rows["reference ED-DC"].model_dump(exclude=left_out)
+    assert rows["updates-cpu ED-DC-75"].model_dump(exclude=left_out) == shared
+    assert rows["architecture-cpu ED-d3-f16"].model_dump(exclude=left_out) == shared
     assert rows["sensitivity ED-default"].model_dump(exclude=left_out) == shared
 
 
