@@ -4,14 +4,18 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-# Logs and results of the reference run, which is not kept, and its report, which is.
-REFERENCE ?= build/reference
-REFERENCE_REPORT ?= reports/reference
-REFERENCE_LOGS ?= convert town-v1 $(REFERENCE)/logs --size small
-REFERENCE_MATRIX ?= reference
-REFERENCE_COMMANDS := "$(REFERENCE_LOGS)" \
-  "run $(REFERENCE_MATRIX) --logs $(REFERENCE)/logs --out $(REFERENCE)/run --jobs 2" \
-  "report $(REFERENCE)/run --out $(REFERENCE_REPORT)"
+# Reports that are kept with the code are runs of these presets on the frozen town. Logs, grids, trainings and results,
+# which are not kept, lie in KEPT.
+PRESET_reference := reference
+PRESET_architecture := architecture-cpu
+PRESET_sensitivity := sensitivity
+KEPT ?= build/kept
+KEPT_LOGS ?= convert town-v1 $(KEPT)/logs --size small
+KEPT_REPORTS ?= reports
+KEPT_SHARED := --grids $(KEPT)/grids --trainings $(KEPT)/trainings
+KEPT_COMMANDS = "$(KEPT_LOGS)" \
+  "run $(PRESET_$@) --logs $(KEPT)/logs --out $(KEPT)/$@ $(KEPT_SHARED) --jobs 2" \
+  "report $(KEPT)/$@ --out $(KEPT_REPORTS)/$@"
 
 # Cases of each kind, and a bound for all of them together.
 FUZZ_COUNT ?= 1000
@@ -29,14 +33,14 @@ PACKAGE ?= build/package
 PACKAGE_COMMANDS := "convert synthetic logs --recordings 4 --towns 2 --town-size-m 250 --duration-s 15" "check logs" \
   "run smoke --logs logs --out run" "report run" "play run ED-DC --logs logs --out play.mcap"
 
-.PHONY: demo test test-slow test-all check docs reference fuzz licences soak package test-lowest test-pythons clean
+.PHONY: demo test test-slow test-all check docs reference architecture sensitivity fuzz licences soak package test-lowest test-pythons clean
 
 demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo
 
-reference: $(READY)  ## the paper's table on the simulated town: 15 trainings, time not measured yet; continues where it was stopped
-	for command in $(REFERENCE_COMMANDS); do $(BIN)/semgrid-eval $$command || exit 1; done
-	$(BIN)/python tools/reference_readme.py $(REFERENCE)/run $(REFERENCE_REPORT) $(REFERENCE_COMMANDS)
+reference architecture sensitivity: $(READY)  ## a kept report (reports/README.md); goes on where it was stopped
+	for command in $(KEPT_COMMANDS); do $(BIN)/semgrid-eval $$command || exit 1; done
+	$(BIN)/python tools/report_readme.py $(KEPT)/$@ $(KEPT_REPORTS)/$@ $(KEPT_COMMANDS)
 
 test: $(READY)  ## the suite, but for what takes more than three seconds a test
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"

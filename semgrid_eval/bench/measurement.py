@@ -25,10 +25,21 @@ class Settings:
     pictures_px: tuple[ImageSize, ...] = (ImageSize(512, 256), ImageSize(2048, 1024))  # of cameras in logs
     recordings: int = 16  # whose conversion and grids are shared by `workers`
     workers: int = 2  # processes at once
+    trained_recordings: tuple[int, ...] = (300, 30_000)  # of which a network learns
+    reported: tuple[int, int, int] = (18, 20, 500)  # rows, repeats and recordings of a run that is reported
 
 
 FULL = Settings()
-QUICK = Settings(repeats=1, features=(16,), updates=3, windows=32, pictures_px=(ImageSize(512, 256),), recordings=4)
+QUICK = Settings(
+    repeats=1,
+    features=(16,),
+    updates=3,
+    windows=32,
+    pictures_px=(ImageSize(512, 256),),
+    recordings=4,
+    trained_recordings=(300,),
+    reported=(6, 4, 100),
+)
 
 
 @dataclass(frozen=True)

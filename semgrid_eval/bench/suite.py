@@ -8,7 +8,7 @@ from pathlib import Path
 
 import torch
 
-from semgrid_eval.bench import cells, data, logs, networks
+from semgrid_eval.bench import cells, data, logs, memory, networks, whole
 from semgrid_eval.bench.material import Material
 from semgrid_eval.bench.measurement import Measurement, Settings
 from semgrid_eval.errors import ConfigError
@@ -17,7 +17,7 @@ from semgrid_eval.models.device import cpu_facts
 from semgrid_eval.progress import Progress, silent
 from semgrid_eval.runs.record import machine, versions
 
-_OF_DATA = {
+_OF_MATERIAL = {
     "start": data.measure_start,
     "town": data.measure_town,
     "render": data.measure_rendering,
@@ -25,9 +25,15 @@ _OF_DATA = {
     "logs": logs.measure_logs,
     "grids": cells.measure_grids,
     "cells": cells.measure_cells,
+    "memory": memory.measure_memory,
+    "report": whole.measure_report,
+    "demo": whole.measure_demo,
 }
 _OF_NETWORKS = {"training": networks.measure_training, "prediction": networks.measure_prediction}
-PARTS = (*_OF_DATA, *_OF_NETWORKS)
+_LONG = ("memory", "report", "demo")
+USUAL = (*(part for part in _OF_MATERIAL if part not in _LONG), *_OF_NETWORKS)
+"""What is measured where no part is asked for."""
+PARTS = (*USUAL, *_LONG)
 
 
 def measure(
@@ -49,8 +55,8 @@ def measure(
         material = Material(Path(folder), settings)
         for part in chosen:
             progress(len(found), len(chosen), part)
-            measurements = _OF_DATA[part](material) if part in _OF_DATA else _OF_NETWORKS[part](settings, device)
-            found[part] = list(measurements)
+            of_network = _OF_NETWORKS.get(part)
+            found[part] = list(of_network(settings, device) if of_network else _OF_MATERIAL[part](material))
     progress(len(chosen), len(chosen), "done")
     return found
 

@@ -1,13 +1,14 @@
 import json
 import os
 import shlex
+import subprocess
 
 import pytest
 from click.testing import CliRunner
 
 from semgrid_eval.bench import measurement
 from semgrid_eval.bench.measurement import Settings
-from semgrid_eval.bench.suite import PARTS
+from semgrid_eval.bench.suite import PARTS, USUAL
 from semgrid_eval.cli import bench
 from semgrid_eval.cli.main import cli, main
 from semgrid_eval.recording.colour import ImageSize
@@ -25,6 +26,8 @@ TINY = Settings(
     matrix_rows=64,
     recordings=2,
     workers=1,
+    trained_recordings=(20,),
+    reported=(3, 2, 20),
 )
 
 
@@ -39,7 +42,7 @@ def test_every_part_is_measured_printed_and_written(tiny, tmp_path):
     assert done.exit_code == 0, done.output
     conditions, *lines = done.stdout.splitlines()
     assert conditions.startswith("processor ")
-    assert tuple(dict.fromkeys(line.split()[0] for line in lines)) == PARTS
+    assert tuple(dict.fromkeys(line.split()[0] for line in lines)) == USUAL
     told = json.loads((tmp_path / "bench.json").read_text())
     assert len(told["measurements"]) == len(lines)
     assert all(row["value"] > 0.0 for row in told["measurements"] if row["unit"] != "s CPU")
@@ -57,6 +60,31 @@ def test_the_example_measures_the_parts_that_it_names(tiny):
     assert done.exit_code == 0, done.output
     assert {line.split()[0] for line in done.stdout.splitlines()[1:]} == {"training", "prediction"}
     assert "f 2, against the textbook" in done.stdout
+
+
+@pytest.mark.slow
+def test_memory_of_a_training_and_the_report_of_a_large_run_are_measured_when_asked_for(tiny, tmp_path):
+    asked = ["bench", "--quick", "--only", "memory,report", "--json", str(tmp_path / "bench.json")]
+    done = CliRunner().invoke(cli, asked)
+    assert done.exit_code == 0, done.output
+    rows = json.loads((tmp_path / "bench.json").read_text())["measurements"]
+    value = {row["what"]: row["value"] for row in rows}
+    of_cells_and_two_bytes = 21 * 30 * 128 * 128 / 2**20
+    assert value["20 recordings, grids mapped"] == pytest.approx(of_cells_and_two_bytes, rel=0.05)
+    assert 200 < value["20 recordings, most anonymous memory"] < 2048
+    assert 0.3 < value["20 recordings, against grids in memory"] < 3.0
+    assert 0.5 < value["3 rows, 2 repeats, 20 recordings"] < 60.0
+    assert 100 < value["3 rows, 2 repeats, 20 recordings, memory"] < 1024
+
+
+def test_the_demo_is_measured_by_the_clock_with_its_own_command(tiny, monkeypatch):
+    started = []
+    monkeypatch.setattr(subprocess, "run", lambda command, **_: started.append(command))
+    done = CliRunner().invoke(cli, ["bench", "--quick", "--only", "demo"])
+    assert done.exit_code == 0, done.output
+    (command,) = started
+    assert CliRunner().invoke(cli, [*command[3:], "--no-such-option"]).output.count("No such option '--no-such-option'")
+    assert "at most 180" in done.stdout
 
 
 def test_a_busy_machine_is_a_warning(tiny, monkeypatch):

@@ -1,13 +1,5 @@
-"""How long a report of a large run takes, and how much memory: 18 rows, 20 repeats and 500 windows made from nothing.
+"""A run of many rows, repeats and windows, made from nothing, whose report is measured."""
 
-Example: python tools/report_load.py /tmp/large
-"""
-
-import argparse
-import resource
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -24,23 +16,6 @@ CLASSES = 10
 SPEC = GridSpec(rows=32, columns=32, agent_row=32, agent_column=16)
 WRONG = 0.2
 FRAME_NS = 58_823_529
-
-
-def main() -> None:
-    """Make the run where there is none, write its report and print seconds and memory."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("run", type=Path)
-    for name, number in (("rows", 18), ("repeats", 20), ("windows", 500)):
-        parser.add_argument(f"--{name}", type=int, default=number)
-    options = parser.parse_args()
-    if not (options.run / results.RUN_FILE).is_file():
-        make_run(options.run, options.rows, options.repeats, options.windows)
-    start_s = time.perf_counter()
-    command = "import sys; from pathlib import Path; from semgrid_eval.report.page.write import write_report; "
-    subprocess.run([sys.executable, "-c", command + "write_report(Path(sys.argv[1]))", options.run], check=True)
-    seconds, used = time.perf_counter() - start_s, resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu_s = used.ru_utime + used.ru_stime
-    sys.stdout.write(f"{seconds:.1f} s by the clock, {cpu_s:.1f} s CPU, {used.ru_maxrss / 2**10:.0f} MiB\n")
 
 
 def make_run(run: Path, rows: int, repeats: int, windows: int) -> None:
@@ -143,7 +118,3 @@ def _scored(generator: np.random.Generator, windows: int) -> ScoredWindows:
         actors=generator.choice(np.array([0, STANDING, MOVING], np.uint8), shape),
         spec=SPEC,
     )
-
-
-if __name__ == "__main__":
-    main()

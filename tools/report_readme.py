@@ -1,6 +1,6 @@
-"""Write the README of a reference report: what was run, on what, by which commands, and what came out.
+"""Write the README of a report that is kept with the code: what was run, on what, by which commands, and what came out.
 
-Example: python tools/reference_readme.py build/reference/run reports/reference "run reference --logs LOGS --out RUN"
+Example: python tools/report_readme.py build/kept/reference reports/reference "run reference --logs LOGS --out RUN"
 """
 
 import argparse
@@ -15,7 +15,7 @@ from semgrid_eval.scores.results import ResultRecord, RunRecord, read_result, re
 
 README = """# {title}
 
-A report made by `make reference`; the page is [index.html](index.html).
+A report made by `make {name}`; the page is [index.html](index.html).
 
 | | |
 |---|---|
@@ -40,6 +40,7 @@ def describe(run: Path, report: Path, commands: list[str]) -> str:
     done = [read_result(result_folder(run, name)) for name in {name for row in record.rows for name in row.results}]
     return README.format(
         title=record.title,
+        name=report.resolve().name,
         facts="\n".join(f"| {name} | {value} |" for name, value in facts(record, done).items()),
         commands="\n".join(f"semgrid-eval {command}" for command in commands),
         scores=(report / "summary.md").read_text(encoding="utf-8"),
