@@ -39,6 +39,7 @@ demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo
 
 reference architecture sensitivity: $(READY)  ## a kept report (reports/README.md); goes on where it was stopped
+	mkdir -p $(KEPT)/trainings
 	for command in $(KEPT_COMMANDS); do $(BIN)/semgrid-eval $$command || exit 1; done
 	$(BIN)/python tools/report_readme.py $(KEPT)/$@ $(KEPT_REPORTS)/$@ $(KEPT_COMMANDS)
 
