@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from semgrid_eval.cli.console import loudness_options, progress, say
-from semgrid_eval.cli.options import FILE_THERE, FOLDER, logs_argument
+from semgrid_eval.cli.options import FILE_THERE, FOLDER, logs_argument, workers_option
 from semgrid_eval.errors import printable
 from semgrid_eval.words import plural
 
@@ -42,8 +42,11 @@ def _print_spec(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
 )
 @click.option("--strict", is_flag=True, help="Refuse warnings, too: a log without checksums, for one.")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+@workers_option("Logs checked at once.")
 @loudness_options
-def command(logs: tuple[Path, ...], recover: Path | None, spec: Path | None, *, strict: bool, as_json: bool) -> int:
+def command(
+    logs: tuple[Path, ...], recover: Path | None, spec: Path | None, workers: int, *, strict: bool, as_json: bool
+) -> int:
     """Check logs: every LOG that is a file, all logs below every LOG that is a folder; LOG may be a pattern in quotes.
 
     Looks at all checksums, decodes every label and disparity image, and compares channels, counts, times, calibration
@@ -55,17 +58,15 @@ def command(logs: tuple[Path, ...], recover: Path | None, spec: Path | None, *, 
     The exit code is 0 if there is no error, 1 if there is one (with --strict: or a warning; with --recover: or a
     loss), and 3 if a log cannot be read to its end (with --recover: if nothing of it could be saved).
     """
-    from semgrid_eval.log.check import check_log
+    from semgrid_eval.executors import local_executor
+    from semgrid_eval.log.check import check_logs
     from semgrid_eval.log.contract import load_contract
 
     contract = None if spec is None else load_contract(spec)
     outcomes = _recovered(logs, recover) if recover is not None else None
     paths = _found(logs) if outcomes is None else [each.out for each in outcomes if each.recovery is not None]
-    reports: list[LogReport] = []
     with progress("check") as watch:
-        for path in paths:
-            reports.append(check_log(path, contract))
-            watch(len(reports), len(paths), path.name)
+        reports = check_logs(paths, contract, local_executor(min(workers, len(paths))), watch)
     if as_json:
         told = [each.to_json() for each in outcomes or ()]
         value = {"format_version": _FORMAT_VERSION, "logs": [each.to_json() for each in reports], "recoveries": told}

@@ -1,9 +1,11 @@
 """Check a log: is it whole, can all its pictures be decoded, and does it hold what a contract expects?"""
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 from semgrid_eval.errors import LogError
+from semgrid_eval.executors import Executor, WorkerDied
 from semgrid_eval.log import topics
 from semgrid_eval.log.container import damage_as_log_error
 from semgrid_eval.log.contract import Cameras, Contract, TopicContract, topics_of
@@ -14,11 +16,27 @@ from semgrid_eval.log.reader import LogReader
 from semgrid_eval.log.stamps import stamp_of
 from semgrid_eval.log.timing import Timeline, Times, coverage, judged, latencies, timing
 from semgrid_eval.log.topics import camera_topic, lidar_topic
+from semgrid_eval.progress import Progress, silent
 from semgrid_eval.recording.types import Quantity
 
 _NEEDED = (topics.DISPARITY, topics.CALIBRATION, topics.STEREO)
 """Channels of a camera without which its pictures cannot be looked at; a single camera has not the first."""
 _TRUTH = {topics.TRUE_POSE, topics.TRUE_ACTORS}
+
+
+def check_logs(
+    paths: Sequence[Path], contract: Contract | None, executor: Executor, progress: Progress = silent
+) -> list[LogReport]:
+    """Check several logs side by side and return their reports in the same order."""
+    reports: dict[int, LogReport] = {}
+    for index, outcome in executor.run(partial(check_log, contract=contract), paths):
+        reports[index] = _unread(paths[index], outcome) if isinstance(outcome, WorkerDied) else outcome
+        progress(len(reports), len(paths), paths[index].name)
+    return [reports[index] for index in range(len(paths))]
+
+
+def _unread(path: Path, died: WorkerDied) -> LogReport:
+    return LogReport(path, {}, 0.0, (error("file", died.reason),), {}, is_readable=False)
 
 
 def check_log(path: Path, contract: Contract | None = None) -> LogReport:

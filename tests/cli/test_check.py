@@ -13,6 +13,8 @@ from support.driving import driving
 from semgrid_eval.cli.check import command
 from semgrid_eval.cli.main import main
 from semgrid_eval.config import parse_config
+from semgrid_eval.executors import WorkerDied
+from semgrid_eval.log.check import check_logs
 from semgrid_eval.log.contract import Contract, TopicContract, contract_text
 from semgrid_eval.log.default_contract import default_contract
 from semgrid_eval.log.findings import MOST_FINDINGS
@@ -57,6 +59,31 @@ def test_damaged_log_gives_one_error_and_exit_code_3(logs, capsys):
     assert said.startswith(f"{logs}/val/b.mcap: error: file: is damaged: its end is missing")
     assert said.count("\n") == 1
     assert run("check", logs / "val/a.mcap", logs) == 3
+
+
+def test_several_processes_find_the_same_in_the_same_order(logs, tmp_path, capsys):
+    for name in "cb":
+        write_log(driving(), logs / f"train/{name}.mcap")
+    (tmp_path / "recording.yaml").write_text("topics: {/ego/motion: {rate_hz: {low: 50, severity: error}}}")
+    found = {}
+    for workers in (1, 2):
+        assert run("check", "--workers", workers, "--spec", tmp_path / "recording.yaml", "--json", logs) == 1
+        found[workers] = json.loads(capsys.readouterr().out)
+    assert found[1] == found[2]
+    assert [Path(each["log"]).name for each in found[2]["logs"]] == ["b.mcap", "c.mcap", "a.mcap"]
+
+
+def test_a_log_that_takes_its_process_along_is_told(logs):
+    class Dying:
+        parallel, threads = 1, None
+
+        def run(self, function, items):
+            yield from reversed([(0, WorkerDied()), (1, function(items[1]))])
+
+    first, second = check_logs([logs / "val/a.mcap"] * 2, None, Dying())
+    assert not first.is_readable
+    assert [str(each) for each in first.findings] == [f"error: file: {WorkerDied().reason}"]
+    assert second.is_readable
 
 
 def test_json_holds_every_log_with_counts_and_findings(logs, capsys):

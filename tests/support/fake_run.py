@@ -100,6 +100,7 @@ REFERENCE_ROWS = (
     *(FakeRow("Fuse", "BL"), FakeRow("Fuse-SL5", "BL", inputs=5)),
     *(FakeRow("Table", "BL", learns=True), FakeRow("Flow", "BL")),
     *(FakeRow(f"PH{at}", "ceiling", 0.01, bound="upper", learns=False, horizon_steps=at + 1) for at in range(4)),
+    FakeRow("SL5", "ceiling", 0.01, bound="upper", learns=False, inputs=5),
     *(FakeRow(name, "truth", 0.02, bound="told", learns=False) for name in ("fresh", "motion")),
     FakeRow("SL5", "RN", 0.01, 1, inputs=5),
 )
