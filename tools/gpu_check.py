@@ -85,7 +85,7 @@ def check_tests(place: Place) -> None:
     """Run the tests that need a CUDA device, and keep the outcome of each."""
     log = place.out / "tests.log"
     command = [sys.executable, "-m", "pytest", "-m", "cuda", "-vv", "-rs", "--color=no", "-W", "default"]
-    chosen = ["tests/windows/test_cuda.py", "tests/models/test_cuda.py", "tests/runs/test_cuda.py"]
+    chosen = sorted(ROOT.glob("tests/*/test_cuda.py"))
     with log.open("w", encoding="utf-8") as stream:
         tests = subprocess.Popen([*command, *chosen], cwd=ROOT, stdout=stream, stderr=subprocess.STDOUT)
         while tests.poll() is None:
@@ -233,8 +233,8 @@ def row_line(name: str, row: dict[str, Any]) -> str:
     """Show a row's mean score with its interval and differences."""
     if "failure" in row:
         return f"{name:12} failed: {row['failure']}"
-    mean, scaled = row["scores"]["mean_known"], (row["scores_at_cpu_scale"] or {}).get("mean_known")
-    parts = [f"{name:12} {mean[0]:.3f} [{mean[1]:.3f}, {mean[2]:.3f}]", f"at CPU scale {scaled or 'none'}"]
+    mean, kept = row["scores"]["mean_known"], (row["scores_of_reference"] or {}).get("mean_known")
+    parts = [f"{name:12} {mean[0]:.3f} [{mean[1]:.3f}, {mean[2]:.3f}]", f"in reports/reference {kept or 'none'}"]
     found = {other: row["minus"][other]["mean_known"] for other in AGAINST if other in row["minus"]}
     parts += [f"minus {other} {value:+.3f} [{low:+.3f}, {high:+.3f}]" for other, (value, low, high) in found.items()]
     return ", ".join([*parts, f"trained {row['train_seconds']} s" if row["train_seconds"] else "not trained"])

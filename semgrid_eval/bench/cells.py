@@ -29,6 +29,7 @@ from semgrid_eval.sources.town.config import FRAME_COUNT
 from semgrid_eval.words import plural
 
 SCORED_WINDOWS = 500
+_FIVE_SENSORS_AT_MOST = 1.03  # times the decoding of their pictures
 
 
 def measure_grids(material: Material) -> Iterator[Measurement]:
@@ -55,7 +56,8 @@ def _measure_log(material: Material, size_px: ImageSize) -> Iterator[Measurement
         what = f"{size_px}, {plural(len(config.sensors), 'sensor')}"
         yield Measurement(what, FRAME_COUNT / wall_s(make, repeats), "frames/s")
         taken = 1.0 / times_as_fast(make, decode, repeats)
-        yield Measurement(f"{what}, against decoding", taken, "times its time")
+        at_most = _FIVE_SENSORS_AT_MOST if len(config.sensors) > 1 else None
+        yield Measurement(f"{what}, against decoding", taken, "times its time", at_most)
 
 
 def measure_cells(material: Material) -> Iterator[Measurement]:

@@ -51,6 +51,7 @@ def _measure_log(material: Material, size_px: ImageSize) -> Iterator[Measurement
         ("written", write, 400.0),
         ("written, pictures looked through", partial(write_log, looked_through, written), None),
         ("read", read, 600.0),
+        ("read by the MCAP library", library, None),
         ("checked", check, None),
     )
     log = f"{size_px}, {megabytes:.1f} MB"

@@ -1,12 +1,17 @@
 """What a benchmark of speed reports, and how it takes time: the median of several repeats."""
 
+import multiprocessing
 import os
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from statistics import median
+from typing import TypeVar
 
 from semgrid_eval.recording.colour import ImageSize
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -26,7 +31,7 @@ class Settings:
     recordings: int = 16  # whose conversion and grids are shared by `workers`
     workers: int = 2  # processes at once
     trained_recordings: tuple[int, ...] = (300, 30_000)  # of which a network learns
-    reported: tuple[int, int, int] = (18, 20, 500)  # rows, repeats and recordings of a run that is reported
+    reported: tuple[int, int, int] = (18, 20, 500)  # rows, repeats and recordings of the run that is reported
 
 
 FULL = Settings()
@@ -98,6 +103,12 @@ def times_as_fast(
     Whatever else the machine does meets both alike. `clock` gives seconds.
     """
     return median(_elapsed(clock, rival) / _elapsed(clock, ours) for _ in range(repeats))
+
+
+def apart(work: Callable[[], T]) -> T:
+    """Do `work`, which must be picklable, in a new process: what others did before counts as no memory of it."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as process:
+        return process.submit(work).result()
 
 
 def _elapsed(clock: Callable[[], float], work: Callable[[], object]) -> float:

@@ -4,21 +4,22 @@ The grids of a few recordings are repeated under other names, then a row of `pap
 the path that a run takes. In the end updates on these grids and on the unrepeated ones in memory take turns.
 """
 
-import multiprocessing
 import re
 import tempfile
 import threading
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
+from itertools import count
 from pathlib import Path
 
 import torch
 
 from semgrid_eval.bench.material import Material
-from semgrid_eval.bench.measurement import Measurement, Settings, times_as_fast
+from semgrid_eval.bench.measurement import Measurement, Settings, apart, seconds_passed, times_as_fast
 from semgrid_eval.config import parse_config
+from semgrid_eval.errors import InputError
 from semgrid_eval.executors import InProcess
 from semgrid_eval.log.store import write_log
 from semgrid_eval.models.fitting import Lesson
@@ -36,20 +37,19 @@ from semgrid_eval.windows.data import WindowSet
 from semgrid_eval.windows.storage import Storage
 
 MEMORY_AT_MOST_MIB, SPEED_AT_LEAST = 2048.0, 0.9
-CPU = torch.device("cpu")
+_CPU = torch.device("cpu")
 _ROW = "ED-DC"
 _RECORDINGS = 12  # whose grids are repeated, and which are held in memory for comparison
 _SAMPLE_S = 0.02
-_ANONYMOUS = re.compile(r"RssAnon:\s+(\d+) kB")
 
 
 def measure_memory(material: Material) -> Iterator[Measurement]:
     """Train on few and on many recordings, each in a process of its own, which no other part has grown."""
     settings = material.settings
     logs = _logs(material)
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), max_tasks_per_child=1) as apart:
-        for count in settings.trained_recordings:
-            yield from apart.submit(_measure, logs, material.folder / f"trained-{count}", count, settings).result()
+    for recordings in settings.trained_recordings:
+        folder = material.folder / f"trained-{recordings}"
+        yield from apart(partial(_measure, logs, folder, recordings, settings))
 
 
 def _logs(material: Material) -> Path:
@@ -63,23 +63,26 @@ def _logs(material: Material) -> Path:
     return folder
 
 
-def _measure(logs: Path, folder: Path, count: int, settings: Settings) -> list[Measurement]:
+def _measure(logs: Path, folder: Path, recordings: int, settings: Settings) -> list[Measurement]:
     """Train and score the row on so many recordings, then hold its speed against that of the unrepeated ones."""
     torch.set_num_threads(1)
-    matrix, row = _one_row(settings.updates)
-    data = RunData(logs, folder / "grids", [row], executor=InProcess(), device=CPU, stage=silent_stage)
+    matrix, row = _one_row(2 * settings.updates)
+    data = RunData(logs, folder / "grids", [row], executor=InProcess(), device=_CPU, stage=silent_stage)
     packed, repeated = folder / "packed", folder / "repeated"
     pack_grids(data, row.grid, packed)
-    _repeat(packed, repeated, count)
+    _repeat(packed, repeated, recordings)
     options = RunOptions("cpu", folder / "grids", "", executor=InProcess())
     with _watched() as most_mib:
         worker = make_worker(matrix, repeated, folder / "run", options, silent_stage)
         job = worker.look(row, matrix.seed)
         worker.run(row, matrix.seed)
     mapped = _windows(job)
-    source = PackedGrids(packed, [row], Storage(CPU))
+    source = PackedGrids(packed, [row], Storage(_CPU))
     held = _windows(replace(worker, training_data=source, scored_data=source).look(row, matrix.seed))
-    speed = times_as_fast(lambda: _train(job, mapped), lambda: _train(job, held), settings.repeats)
+    held.data.grids.sum()  # gathers them
+    seeds = (count(), count())  # other windows each time
+    ours, rival = (lambda: _train(job, mapped, next(seeds[0]))), (lambda: _train(job, held, next(seeds[1])))
+    speed = times_as_fast(ours, rival, settings.repeats, clock=seconds_passed)
     what = f"{len(mapped.data.recordings):,} recordings"
     return [
         Measurement(f"{what}, grids mapped", mapped.data.grids.nbytes / 2**20, "MiB"),
@@ -99,13 +102,13 @@ def _one_row(updates: int) -> tuple[Matrix, Row]:
     return matrix.model_copy(update={"rows": (row,)}), row
 
 
-def _repeat(packed: Path, target: Path, count: int) -> None:
+def _repeat(packed: Path, target: Path, recordings: int) -> None:
     """Give the recordings of the training split more names, up to so many; the others stay as they are."""
     file = packed / INDEX_FILE
     index = parse_config(PackedIndex, read_sealed_json(file), path=file)
     train = [log for log in index.logs if log.split == "train"]
     others = {log.path: log for log in index.logs if log.split != "train"}
-    sources = others | {f"train/{number:06}.mcap": train[number % len(train)] for number in range(count)}
+    sources = others | {f"train/{number:06}.mcap": train[number % len(train)] for number in range(recordings)}
     for path, log in sources.items():
         link = (target / path).with_suffix(".npz")
         link.parent.mkdir(parents=True, exist_ok=True)
@@ -120,12 +123,11 @@ def _windows(job: Job) -> WindowSet:
     return job.training.windows
 
 
-def _train(job: Job, windows: WindowSet) -> None:
+def _train(job: Job, windows: WindowSet, seed: int) -> None:
     """Train the network of a job on windows."""
     with tempfile.TemporaryDirectory() as folder:
-        make_ready(
-            job.resolved.model, job.resolved.settings, Lesson(job.row.given, 0, CPU, windows, folder=Path(folder))
-        )
+        lesson = Lesson(job.row.given, seed, _CPU, windows, folder=Path(folder))
+        make_ready(job.resolved.model, job.resolved.settings, lesson)
 
 
 @contextmanager
@@ -147,6 +149,25 @@ def _watched() -> Iterator[list[float]]:
 
 
 def _anonymous_mib() -> float:
-    """Return the anonymous memory of this process, as Linux tells it."""
-    told = _ANONYMOUS.search(Path("/proc/self/status").read_text())
-    return int(told[1]) / 1024 if told else 0.0
+    """Return the anonymous memory of this process, which a system cannot take back."""
+    return _told_mib("RssAnon")
+
+
+def most_memory_mib() -> float:
+    """Return the most memory that this process has held."""
+    return _told_mib("VmHWM")
+
+
+def _told_mib(name: str) -> float:
+    """Return a number that Linux tells of this process.
+
+    Raises:
+        InputError: this system does not tell.
+    """
+    try:
+        told = re.search(rf"{name}:\s+(\d+) kB", Path("/proc/self/status").read_text())
+    except OSError:
+        told = None
+    if told is None:
+        raise InputError(f"memory is measured on Linux alone: no {name} in /proc/self/status")
+    return int(told[1]) / 1024

@@ -82,17 +82,17 @@ def _sized(row: Row, size: Mapping[str, int], *, smoke: bool) -> Row:
 def scores_of(folder: Path, reference: Path) -> dict[str, dict[str, object]]:
     """Return scores of the rows that a run has finished, with intervals over recordings, and paired differences.
 
-    `reference` is the folder of the report at a CPU's scale, whose scores are put beside them.
+    `reference` is the folder of a report, whose scores are put beside them.
     """
     (run,) = load_runs([folder])
-    scaled = _scaled_scores(reference)
+    kept = kept_scores(reference)
     scores = score_regions([row for row in run.rows if row.results], IOU, EVERYWHERE, Resampling()).get("all", {})
-    rows = {name: _row(entry, scores, scaled.get(name)) for name, entry in scores.items()}
+    rows = {name: _row(entry, scores, kept.get(name)) for name, entry in scores.items()}
     failed = {row.name: row.failures[0] for row in run.rows if row.failures and not row.results}
     return rows | {name: {"failure": reason} for name, reason in failed.items()}
 
 
-def _row(entry: RowScores, scores: Mapping[str, RowScores], scaled: Mapping[str, float] | None) -> dict[str, object]:
+def _row(entry: RowScores, scores: Mapping[str, RowScores], kept: Mapping[str, float] | None) -> dict[str, object]:
     record, history = entry.results[0].record, entry.results[0].history
     others = [scores[name] for name in AGAINST if name in scores and name != entry.row.name]
     return {
@@ -104,7 +104,7 @@ def _row(entry: RowScores, scores: Mapping[str, RowScores], scaled: Mapping[str,
         "parameters": record.parameters,
         "windows": entry.windows,
         "scores": {column: _plain(entry.estimate(column)) for column in IOU.category_columns},
-        "scores_at_cpu_scale": scaled,
+        "scores_of_reference": kept,
         "minus": {
             other.row.name: {column: _plain(entry.minus(other, column)) for column in IOU.category_columns}
             for other in others
@@ -118,9 +118,14 @@ def _plain(estimate: Estimate) -> list[float]:
     return [round(each, 4) for each in (estimate.value, estimate.low, estimate.high)]
 
 
-def _scaled_scores(report: Path) -> dict[str, dict[str, float]]:
-    table = pd.read_csv(report / "summary.csv").pivot_table(index="row", columns="score", values="iou")
-    return {str(name): {c: round(float(row[c]), 4) for c in IOU.category_columns} for name, row in table.iterrows()}
+def kept_scores(report: Path) -> dict[str, dict[str, float]]:
+    """Read the IoU of the categories from a report's summary, by the names of the rows."""
+    table = pd.read_csv(report / "summary.csv")
+    table = table[(table["metric"] == IOU.name) & (table["division"] == EVERYWHERE.name) & (table["region"] == "all")]
+    table = table[table["column"].isin(IOU.category_columns)]
+    return {
+        str(row): dict(zip(each["column"], each["value"].round(4), strict=True)) for row, each in table.groupby("row")
+    }
 
 
 def price_of_paper(run: Path) -> dict[str, object]:

@@ -69,11 +69,11 @@ def test_memory_of_a_training_and_the_report_of_a_large_run_are_measured_when_as
     assert done.exit_code == 0, done.output
     rows = json.loads((tmp_path / "bench.json").read_text())["measurements"]
     value = {row["what"]: row["value"] for row in rows}
-    of_cells_and_two_bytes = 21 * 30 * 128 * 128 / 2**20
-    assert value["20 recordings, grids mapped"] == pytest.approx(of_cells_and_two_bytes, rel=0.05)
+    assert value["20 recordings, grids mapped"] == 20 * 30 * 128 * 128 / 2**20
     assert 200 < value["20 recordings, most anonymous memory"] < 2048
     assert 0.3 < value["20 recordings, against grids in memory"] < 3.0
-    assert 0.5 < value["3 rows, 2 repeats, 20 recordings"] < 60.0
+    assert value["3 rows, 2 repeats, 20 recordings"] > 0.5
+    assert value["3 rows, 2 repeats, 20 recordings, by the clock"] > 0.5
     assert 100 < value["3 rows, 2 repeats, 20 recordings, memory"] < 1024
 
 

@@ -13,7 +13,7 @@ import pytest
 from support.recordings import random_recording
 
 from semgrid_eval.bench.archives import pack_run
-from semgrid_eval.bench.paper import matrix_of_grids
+from semgrid_eval.bench.paper import kept_scores, matrix_of_grids
 from semgrid_eval.files import write_json
 from semgrid_eval.grids.recording import write_recordings
 from semgrid_eval.grids.spec import GridConfig
@@ -22,7 +22,8 @@ from semgrid_eval.runs.packed import PackedIndex, write_index
 from semgrid_eval.runs.runner import RunOptions, run_matrix
 from semgrid_eval.scores.results import LogRecord
 
-TOOL = Path(__file__).parents[2] / "tools" / "gpu_check.py"
+ROOT = Path(__file__).parents[2]
+TOOL = ROOT / "tools" / "gpu_check.py"
 SENSORS = tuple(GridConfig().sensors)
 
 
@@ -76,7 +77,7 @@ def test_rates_then_rows_are_measured_scored_and_priced(carried, tmp_path):
     assert list(paper["rows"]) == ["BL-DC", "BL-Fuse", "ED-DC"]
     row = paper["rows"]["ED-DC"]
     assert row["updates"] == 1
-    assert row["scores_at_cpu_scale"]["mean_known"] == pytest.approx(0.573, abs=5e-4)
+    assert row["scores_of_reference"] == kept_scores(ROOT / "reports" / "reference")["ED-DC"]
     value, low, high = row["minus"]["BL-Fuse"]["mean_known"]
     assert low <= value <= high
     assert value == pytest.approx(
@@ -88,6 +89,17 @@ def test_rates_then_rows_are_measured_scored_and_priced(carried, tmp_path):
     assert "the paper's own rows, estimated" in printed
     with tarfile.open(tmp_path / "out" / "paper-run.tar.gz") as archive:
         assert "run/run.json" in archive.getnames()
+
+
+@pytest.mark.slow
+def test_without_a_card_every_test_of_it_is_skipped(carried, tmp_path):
+    code, printed = check(carried, tmp_path / "out", "tests:300")
+    assert code == 0, printed
+    found = figures(tmp_path / "out", "tests")
+    assert found["complete"]
+    assert set(found["tests"].values()) == {"SKIPPED"}
+    marked = {path for path in ROOT.glob("tests/**/test_*.py") if "NEEDS_CUDA" in path.read_text()} - {Path(__file__)}
+    assert {ROOT / name.partition("::")[0] for name in found["tests"]} == marked
 
 
 @pytest.mark.slow
