@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 
 from semgrid_eval.bench.growth import CPU, FULL, SCORED_A_RECORDING, SMALL, Point, curve, exponents, measured, prices
 from semgrid_eval.bench.networks import RESIDUAL
-from semgrid_eval.files import read_json, write_json, write_text
+from semgrid_eval.files import digest_value, read_json, write_json, write_text
 from semgrid_eval.log.store import find_logs
 from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
 from semgrid_eval.models.network import NetworkSettings
@@ -30,7 +30,8 @@ from semgrid_eval.report.claims.claims import in_paper
 from semgrid_eval.report.figures.style import SETTINGS, finish, line_style
 from semgrid_eval.runs.matrix import load_matrix
 from semgrid_eval.runs.record import machine
-from semgrid_eval.runs.row import Row, plan_units
+from semgrid_eval.runs.row import Row, Unit, plan_units
+from semgrid_eval.windows.plan import WindowConfig
 
 RECORDINGS, VALIDATED = 420, 120
 """Of town-v1 small: all, and those that are scored, in one window each."""
@@ -46,8 +47,8 @@ def hours(found: dict[str, Any]) -> dict[str, dict[str, float]]:
     rate = read_json(RATES / "rates.json")["figures"]["trained by the package"]["value"]
     table = {}
     for name, rows in matrices().items():
-        units = [unit.row for unit in plan_units(rows, 0).values()]
-        trainings = [training for row in units if (training := training_of(row)) is not None]
+        units = list(plan_units(rows, 0).values())
+        trainings = [each for row in {learned(u): u.row for u in units}.values() if (each := training_of(row))]
         trained_s = sum(windows * found["prices"][kind] for kind, windows in trainings)
         total_s = RECORDINGS * grids_s(found["points"]) + trained_s + len(units) * VALIDATED * answer_s(found["points"])
         cores = {f"{count} cores": total_s / count / 3600 for count in (2, 16, 20)}
@@ -75,6 +76,14 @@ def matrices() -> dict[str, list[Row]]:
     """Return the rows that hours are told of: all of `paper-cpu`, and the paper's own of `paper`."""
     paper = [row for row in load_matrix("paper").rows if in_paper(row.name)]
     return {"paper-cpu": list(load_matrix("paper-cpu").rows), "paper": paper}
+
+
+def learned(unit: Unit) -> str:
+    """Return what one training is known by: rows for all leads share theirs, whatever lead each is scored at."""
+    row = unit.row
+    if row.train_leads:
+        row = row.model_copy(update={"window": WindowConfig(inputs=row.window.inputs)})
+    return digest_value([unit.seed, row.identity()])
 
 
 def training_of(row: Row) -> tuple[str, int] | None:

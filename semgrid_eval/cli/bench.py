@@ -19,7 +19,7 @@ _SHOWN = ("processor", "cpu_cores", "torch_threads", "device", "gpu", "python", 
 @click.option(
     "--only", metavar="PART,...", help="Measure these parts alone; memory, report and demo are measured only so."
 )
-@click.option("--quick", is_flag=True, help="Once each, and the smallest network alone.")
+@click.option("--quick", is_flag=True, help="Once each, with less to do: the smallest network alone, for one.")
 @click.option("--device", default="cpu", show_default=True, help="Device of networks: auto, cpu, cuda or cuda:N.")
 @click.option(
     "--json", "json_file", type=click.Path(path_type=Path, dir_okay=False), help="Also write everything there."
