@@ -23,16 +23,22 @@ from semgrid_eval.config import Config
 from semgrid_eval.grids.spec import GridConfig, GridSpec
 from semgrid_eval.models.augment import AugmentConfig
 from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
+from semgrid_eval.models.flow import FlowSettings
 from semgrid_eval.models.network import LossConfig, NetworkSettings, OptimizerConfig, ScheduleConfig, TrainingConfig
+from semgrid_eval.models.overlay import OverlaySettings
+from semgrid_eval.models.recorded import RecordedSettings
 from semgrid_eval.models.residual import ResidualSettings
+from semgrid_eval.models.votes import DrawSettings
 from semgrid_eval.runs.matrix import _MatrixFile
 from semgrid_eval.runs.row import Row
 from semgrid_eval.scores.facts import RowFacts, StreamFacts, StreamRecord
 from semgrid_eval.scores.results import LogRecord, ResultRecord, RowRecord, RunRecord, WindowRecord
 from semgrid_eval.sensors.kinds import KINDS
 from semgrid_eval.sensors.lidar import ColourFrom
+from semgrid_eval.sensors.sensor import SensorConfig
 from semgrid_eval.streams.config import StreamConfig
 from semgrid_eval.streams.profile import LatencyProfile, MadeBy
+from semgrid_eval.windows.disturb.disturbance import Disturbance
 from semgrid_eval.windows.disturb.kinds import KINDS as DISTURBANCES
 from semgrid_eval.windows.plan import WindowConfig
 
@@ -47,13 +53,19 @@ MATRIX: tuple[tuple[str, type[Config]], ...] = (
     ("`grid.classes`", ClassSet),
     ("`grid.classes.categories`", Category),
     ("`grid.classes.classes`", GridClass),
+    ("`grid.sensors`: every kind", SensorConfig),
     *((f"`grid.sensors`: kind `{name}`", kind.config) for name, kind in KINDS.items()),
     ("`colour_from` of a `lidar`", ColourFrom),
     ("`stream`", StreamConfig),
+    ("`disturb`: every kind", Disturbance),
     *((f"`disturb`: kind `{name}`", kind) for name, kind in DISTURBANCES.items()),
     ("`settings` of all networks", NetworkSettings),
     ("`settings` of `ed`", EncoderDecoderSettings),
     ("`settings` of `residual`", ResidualSettings),
+    ("`settings` of `overlay`", OverlaySettings),
+    ("`settings` of `flow`", FlowSettings),
+    ("`settings` of `ceiling` and `fresh`", DrawSettings),
+    ("`settings` of `log`", RecordedSettings),
     ("`training`", TrainingConfig),
     ("`training.optimizer`", OptimizerConfig),
     ("`training.schedule`", ScheduleConfig),

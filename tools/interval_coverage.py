@@ -1,4 +1,4 @@
-"""Measures how often intervals of few recordings miss the truth, by simulation: the table of `docs/gate.md`.
+"""Measures how often intervals of few recordings miss the truth, by simulation: the table of `docs/report.md`.
 
 python tools/interval_coverage.py                                  simulated recordings
 python tools/interval_coverage.py --run RUN ROW OTHER COLUMN       those of a run, taken as all that there are

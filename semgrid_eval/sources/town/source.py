@@ -10,7 +10,7 @@ Traffic comes from Eclipse SUMO, pictures from ray casting with Embree; exact la
 and all road users with their velocities are on topics of their own. Training and validation have different towns.
 Logs that are up to date are left as they are, so the same command can be run again to continue.
 """
-_TOWN_V1_HELP = """Make the frozen data set town-v1 of the simulated town, which is the same everywhere.
+_TOWN_V1_HELP = """Make the frozen data set town-v1 of the simulated town, which is the same wherever processors agree.
 
 It has 300 recordings for training and 120 for validation, or 2,975 and 500 with --size full. The last line says whether
 every recording is the published one. Logs that are up to date are left as they are, so that the same command continues
