@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from support.fake_run import make_fake_run
+from support.fake_run import FakeRow, make_fake_run
 
 from semgrid_eval.cli.main import cli
 from semgrid_eval.report.page.write import write_report
@@ -60,3 +60,27 @@ def test_the_readme_names_commands_scores_and_verdicts(tmp_path):
     assert (report / "summary.md").read_text() in text
     assert "| ED-DC is better than BL-DC on static classes and vehicles | " in text
     assert "| trainings | " in text
+
+
+@pytest.mark.slow
+def test_rows_that_change_one_choice_are_held_against_those_that_change_none(tmp_path):
+    rows = (
+        FakeRow("default", "BL", 0.15),
+        FakeRow("Sp2", "BL", 0.2),
+        FakeRow("Sp2-lower", "BL", 0.1),
+        FakeRow("arc", "BL", 0.3),
+        FakeRow("far", "BL", 0.3, horizon_steps=2),
+        FakeRow("default", "ED", 0.1, 1),
+        FakeRow("relu", "ED", 0.1, 1),
+    )
+    run = make_fake_run(tmp_path / "run", rows=rows)
+    report = write_report([run], tmp_path / "report").parent
+    subprocess.run([sys.executable, ROOT / "tools" / "report_readme.py", run, report, "run x"], check=True)
+    _, _, text = (report / "README.md").read_text().partition("## Each choice against the default")
+    lines = [line.split(" | ") for line in text.strip().splitlines()[2:]]
+    minus = "\N{MINUS SIGN}"
+    pairs = ["BL-Sp2 BL-default", "BL-Sp2-lower BL-Sp2", "BL-arc BL-default", "BL-far BL-default", "ED-relu ED-default"]
+    assert [line[0].removeprefix("| ").replace(f" {minus} ", " ") for line in lines] == pairs
+    assert [line[1][0] for line in lines[:3]] == ["-", "+", "-"]
+    assert lines[3][1].endswith(", other targets")
+    assert re.fullmatch(r"[+-]0\.\d{3} \([+-]0\.\d{3} to [+-]0\.\d{3}\)", lines[0][1])

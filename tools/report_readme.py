@@ -5,12 +5,17 @@ Example: python tools/report_readme.py build/kept/reference reports/reference "r
 
 import argparse
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 import pandas as pd
 
 from semgrid_eval.files import write_text
+from semgrid_eval.report.estimates.bootstrap import Resampling, RowScores, score_regions
+from semgrid_eval.report.estimates.division import EVERYWHERE
 from semgrid_eval.report.page.provenance import data_sets
+from semgrid_eval.report.rows.load import load_runs
+from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.scores.results import ResultRecord, RunRecord, read_result, read_run, result_folder
 
 README = """# {title}
@@ -27,25 +32,27 @@ A report made by `make {name}`; the page is [index.html](index.html).
 
 ## Scores
 
-{scores}
-## The paper's claims on this run
-
-{claims}
-"""
+{scores}"""
+DEFAULT = "-default"
+"""How the names of rows end in which nothing was changed."""
 
 
 def describe(run: Path, report: Path, commands: list[str]) -> str:
     """Describe a run and its report in Markdown; commands are given without the program's name."""
     record = read_run(run)
     done = [read_result(result_folder(run, name)) for name in {name for row in record.rows for name in row.results}]
-    return README.format(
+    text = README.format(
         title=record.title,
         name=report.resolve().name,
         facts="\n".join(f"| {name} | {value} |" for name, value in facts(record, done).items()),
         commands="\n".join(f"semgrid-eval {command}" for command in commands),
         scores=(report / "summary.md").read_text(encoding="utf-8"),
-        claims=claims(pd.read_csv(report / "findings.csv")),
     )
+    found = {
+        "The paper's claims on this run": claims(pd.read_csv(report / "findings.csv")),
+        "Each choice against the default": choices(run),
+    }
+    return text + "".join(f"\n## {heading}\n\n{table}\n" for heading, table in found.items() if table)
 
 
 def facts(record: RunRecord, done: list[ResultRecord]) -> dict[str, str]:
@@ -65,9 +72,40 @@ def facts(record: RunRecord, done: list[ResultRecord]) -> dict[str, str]:
 
 
 def claims(findings: pd.DataFrame) -> str:
-    """Give a table of the claims with their verdicts."""
+    """Give a table of the claims with their verdicts, nothing where none could be tested."""
+    if findings.empty:
+        return ""
     lines = [f"| {line.claim} | {line.verdict} |" for line in findings.drop_duplicates("name").itertuples()]
     return "\n".join(["| claim | verdict |", "|---|---|", *lines])
+
+
+def choices(run: Path) -> str:
+    """Give a table of rows against those in which nothing was changed, nothing where a run has no such rows."""
+    (loaded,) = load_runs([run])
+    scores = score_regions([row for row in loaded.rows if row.results], IOU, EVERYWHERE, Resampling()).get("all", {})
+    lines = []
+    for name, entry in scores.items():
+        usual = scores.get(default_of(name, scores))
+        if usual is None or usual is entry:
+            continue
+        found = [_minus(entry, usual, column) for column in IOU.compared]
+        lines.append(f"| {name} \N{MINUS SIGN} {usual.row.name} | {' | '.join(found)} |")
+    titles = [IOU.labels[column] for column in IOU.compared]
+    return "\n".join([f"| | {' | '.join(titles)} |", "|---|" + "---|" * len(titles), *lines]) if lines else ""
+
+
+def default_of(name: str, names: Iterable[str]) -> str:
+    """Name the row that another one changes: the longest name that it begins with, or the default of its family."""
+    begun = [other for other in names if name.startswith(f"{other}-")]
+    return max(begun, key=len, default=name.partition("-")[0] + DEFAULT)
+
+
+def _minus(entry: RowScores, usual: RowScores, column: str) -> str:
+    """Write a paired difference; scores on other targets are not subtracted."""
+    if entry.row.targets != usual.row.targets:
+        return f"{entry.mean[column]:.3f}, other targets"
+    difference = entry.minus(usual, column)
+    return f"{difference.value:+.3f} ({difference.low:+.3f} to {difference.high:+.3f})"
 
 
 def main() -> None:
