@@ -69,9 +69,9 @@ def test_rows_that_change_one_choice_are_held_against_those_that_change_none(tmp
         FakeRow("Sp2", "BL", 0.2),
         FakeRow("Sp2-lower", "BL", 0.1),
         FakeRow("arc", "BL", 0.3),
-        FakeRow("far", "BL", 0.3, horizon_steps=2),
+        FakeRow("fine", "BL", 0.3, cell_m=0.39),
         FakeRow("default", "ED", 0.1, 1),
-        FakeRow("relu", "ED", 0.1, 1),
+        FakeRow("relu", "ED", 0.1, 1, same_as="ED-default"),
     )
     run = make_fake_run(tmp_path / "run", rows=rows)
     report = write_report([run], tmp_path / "report").parent
@@ -79,8 +79,15 @@ def test_rows_that_change_one_choice_are_held_against_those_that_change_none(tmp
     _, _, text = (report / "README.md").read_text().partition("## Each choice against the default")
     lines = [line.split(" | ") for line in text.strip().splitlines()[2:]]
     minus = "\N{MINUS SIGN}"
-    pairs = ["BL-Sp2 BL-default", "BL-Sp2-lower BL-Sp2", "BL-arc BL-default", "BL-far BL-default", "ED-relu ED-default"]
+    pairs = [
+        "BL-Sp2 BL-default",
+        "BL-Sp2-lower BL-Sp2",
+        "BL-arc BL-default",
+        "BL-fine BL-default",
+        "ED-relu ED-default",
+    ]
     assert [line[0].removeprefix("| ").replace(f" {minus} ", " ") for line in lines] == pairs
-    assert [line[1][0] for line in lines[:3]] == ["-", "+", "-"]
+    assert lines[1][1].startswith("+")
+    assert lines[4][1] == "+0.000 (+0.000 to +0.000)"
     assert lines[3][1].endswith(", other targets")
     assert re.fullmatch(r"[+-]0\.\d{3} \([+-]0\.\d{3} to [+-]0\.\d{3}\)", lines[0][1])
