@@ -5,7 +5,7 @@ Example: python tools/report_readme.py build/kept/reference reports/reference "r
 
 import argparse
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Collection
 from pathlib import Path
 
 import pandas as pd
@@ -94,10 +94,11 @@ def choices(run: Path) -> str:
     return "\n".join([f"| | {' | '.join(titles)} |", "|---|" + "---|" * len(titles), *lines]) if lines else ""
 
 
-def default_of(name: str, names: Iterable[str]) -> str:
+def default_of(name: str, names: Collection[str]) -> str:
     """Name the row that another one changes: the longest name that it begins with, or the default of its family."""
-    begun = [other for other in names if name.startswith(f"{other}-")]
-    return max(begun, key=len, default=name.partition("-")[0] + DEFAULT)
+    usual = name.partition("-")[0] + DEFAULT
+    begun = [other for other in names if name.startswith(f"{other}-") and usual in names]
+    return max(begun, key=len, default=usual)
 
 
 def _minus(entry: RowScores, usual: RowScores, column: str) -> str:
