@@ -15,7 +15,8 @@ from matplotlib.patches import Patch
 from semgrid_eval.report.claims.claims import paper_value
 from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, shared_iou
 from semgrid_eval.report.figures import style
-from semgrid_eval.report.rows.pairing import by_question, rows_alike, settings_but
+from semgrid_eval.report.rows.load import Row
+from semgrid_eval.report.rows.pairing import by_question, rows_alike, settings_but, told_beside
 from semgrid_eval.report.rows.words import question_words
 
 _GAP = 1.0  # between questions, in bars' places; the words of a question stand in it
@@ -71,13 +72,23 @@ def lay_out(scores: Scores) -> list[Group]:
     groups, at = [], 0.0
     known = [entry.row for entry in scores.values()]
     questions = by_question([row for row in known if not row.uses_truth])
-    for rows in questions:
+    for rows, beside in zip(questions, _told(questions, known), strict=True):
         ordered = sorted(rows, key=lambda row: not row.is_baseline)
         words = question_words(rows[0], questions[0][0])
-        told = tuple(scores[row.name] for row in rows_alike(rows[0], known) if row.uses_truth)
+        told = tuple(scores[row.name] for row in known if row in beside)
         groups.append(Group(words, {row.name: at + i for i, row in enumerate(ordered)}, told))
         at += len(rows) + _GAP
     return groups
+
+
+def _told(questions: Sequence[Sequence[Row]], rows: Sequence[Row]) -> list[list[Row]]:
+    """Put the rows told of the truth beside each question; what is nearest to none stands beside the first it fits."""
+    beside = [told_beside(question[0], rows) for question in questions]
+    for row in rows:
+        if row.uses_truth and not any(row in found for found in beside):
+            fits = (found for found, asked in zip(beside, questions, strict=True) if row in rows_alike(asked[0], rows))
+            next(fits, []).append(row)
+    return beside
 
 
 def _panel(axes: Axes, scores: Scores, category: str, groups: Sequence[Group], colours: Mapping[str, str]) -> float:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from semgrid_eval.report.estimates.bootstrap import Parts, RowScores, shared_iou
 from semgrid_eval.report.figures import style
 from semgrid_eval.report.rows.load import Row
-from semgrid_eval.report.rows.pairing import main_group, rows_alike
+from semgrid_eval.report.rows.pairing import main_group, told_beside
 
 _CAPTION = "IoU by distance from the vehicle, with 95% intervals, of rows with the commonest inputs, sensors and lead"
 
@@ -56,7 +56,8 @@ def _strokes(lines: Sequence[Sequence[RowScores]]) -> list[dict[str, Any]]:
 def _lines(parts: Parts, rows: Sequence[Row]) -> list[list[RowScores]]:
     """Return the scores by band of the rows that have some in each."""
     group = main_group([row for row in rows if row.results])
-    alike = [row for row in rows_alike(group[0], rows) if row in group or row.uses_truth] if group else []
+    beside = [*group, *told_beside(group[0], rows)] if group else []
+    alike = [row for row in rows if row in beside]
     found = [[scores[row.name] for scores in parts.values() if row.name in scores] for row in alike]
     return [line for line in found if len(line) == len(parts)]
 

@@ -88,6 +88,16 @@ def rows_alike(row: Row, rows: Sequence[Row]) -> list[Row]:
     return [other for other in alike if _frames_ahead(other) == _frames_ahead(row)]
 
 
+def told_beside(row: Row, rows: Sequence[Row]) -> list[Row]:
+    """Return the rows told of the truth that a row is seen beside: of each model those nearest to what it is asked."""
+    told = [other for other in rows_alike(row, rows) if other.uses_truth]
+    nearest: dict[str, tuple[bool, ...]] = {}
+    for other in told:
+        model = other.record.facts.model
+        nearest[model] = max(nearest.get(model, ()), _nearness(row, other))
+    return [other for other in told if _nearness(row, other) == nearest[other.record.facts.model]]
+
+
 def headline(scores: Scores) -> Headline | None:
     """Find the best row among those that answer the main question; None where nothing is scored."""
     finite = (entry.row for entry in scores.values() if np.isfinite(entry.mean[HEADLINE]))
