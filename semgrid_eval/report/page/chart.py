@@ -6,7 +6,7 @@ from math import ceil, floor, isfinite
 
 from semgrid_eval.report.claims.claims import paper_value
 from semgrid_eval.report.estimates.bootstrap import RowScores, Scores, shared_iou
-from semgrid_eval.report.figures.categories import lay_out
+from semgrid_eval.report.figures.categories import Group, lay_out
 from semgrid_eval.report.figures.style import family_colours
 from semgrid_eval.report.rows.words import model_words
 from semgrid_eval.report.tables.numbers import number
@@ -92,14 +92,28 @@ def draw_chart(scores: Scores) -> Chart:
         marks = tuple(_mark(scores[name], column, axis, best=name in best[column]) for column, axis in axes.items())
         return Entry(name, row.number, row.record.label, row.uses_truth or row.is_oracle, colour, marks)
 
-    groups, told = [], set[str]()
-    for group in lay_out(scores):
-        fresh = [each.row.name for each in group.told if each.row.name not in told]
-        told.update(fresh)  # they stand in the first group that they belong to
-        groups.append((group.words, tuple(map(entry, (*group.places, *fresh)))))
+    laid_out = lay_out(scores)
+    stand_in = _places(scores, laid_out)
+    groups = []
+    for group in laid_out:
+        told = [each.row.name for each in group.told if stand_in[each.row.name] is group]
+        groups.append((group.words, tuple(map(entry, (*group.places, *told)))))
     ends = tuple((iou.labels[column], f"{axis.low:.2f} to {axis.high:.2f}") for column, axis in axes.items())
     paper = any(mark.paper is not None for _, entries in groups for each in entries for mark in each.marks)
     return Chart(ends, tuple(groups), _codes(scores, colours), paper)
+
+
+def _places(scores: Scores, groups: Sequence[Group]) -> dict[str, Group]:
+    """Choose where each row told of the truth stands: in its first group of rows with as many inputs, or its first."""
+    found: dict[str, Group] = {}
+    for group in groups:
+        inputs = scores[next(iter(group.places))].row.record.facts.inputs
+        for each in group.told:
+            first = found.setdefault(each.row.name, group)
+            others = scores[next(iter(first.places))].row.record.facts.inputs
+            if inputs == each.row.record.facts.inputs != others:
+                found[each.row.name] = group
+    return found
 
 
 def _axis(scores: Scores, column: str) -> _Axis:

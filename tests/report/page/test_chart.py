@@ -42,10 +42,10 @@ def test_rows_that_are_asked_the_same_stand_together_and_each_row_once(chart):
 def test_a_ceiling_stands_beside_the_rows_with_as_many_inputs():
     told = {"uses_truth": True, "baseline": False, "learns": False, "bound": "upper", "model": "ceiling"}
     more = (_row(5, "ceiling-SL5", 92, inputs=5, **told), _row(6, "ceiling-SL7", 93, inputs=7, **told))
-    rows = (*ROWS[:3], _row(4, "ceiling", 90, **told), *more)
+    rows = (*ROWS[:2], _row(7, "ED-SL3", 62, inputs=3), ROWS[2], _row(4, "ceiling", 90, **told), *more)
     groups = draw_chart(score_rows(rows, np.random.default_rng(0), draws=20)).groups
     names = [[entry.name for entry in entries] for _, entries in groups]
-    assert names == [["BL-DC", "ED-DC", "ceiling", "ceiling-SL7"], ["ED-SL5", "ceiling-SL5"]]
+    assert names == [["BL-DC", "ED-DC", "ceiling"], ["ED-SL3", "ceiling-SL7"], ["ED-SL5", "ceiling-SL5"]]
 
 
 def test_marks_stand_where_values_lie_between_the_ends_of_an_axis(chart):
