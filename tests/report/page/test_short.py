@@ -102,7 +102,7 @@ def test_what_is_chosen_holds_for_tables_and_figures_and_is_part_of_the_address(
     answers = _seen(browser, ".answers figcaption .name")
     assert answers
     assert not any(name.startswith("ED") for name in [*played, *answers])
-    assert "of 33" in browser.execute_script("return document.querySelector('.chooser output').value")
+    assert "of 34" in browser.execute_script("return document.querySelector('.chooser output').value")
 
 
 def test_rows_are_found_by_their_names_and_all_come_back(browser, reference_page):
@@ -110,7 +110,7 @@ def test_rows_are_found_by_their_names_and_all_come_back(browser, reference_page
     assert _shown(browser, "#chart") == ["RN-NT", "BL-Sp2", "ED-Sp2", "RN-Sp2"]
     browser.execute_script("document.querySelector('.chooser button').click()")
     browser.execute_async_script("setTimeout(arguments[0], 50)")
-    assert len(_shown(browser, "#chart")) == 32
+    assert len(_shown(browser, "#chart")) == 33
     assert browser.execute_script("return location.hash") in ("", "#")
 
 
