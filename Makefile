@@ -33,7 +33,8 @@ PACKAGE ?= build/package
 PACKAGE_COMMANDS := "convert synthetic logs --recordings 4 --towns 2 --town-size-m 250 --duration-s 15" "check logs" \
   "run smoke --logs logs --out run" "report run" "play run ED-DC --logs logs --out play.mcap"
 
-.PHONY: demo test test-slow test-all check docs reference architecture sensitivity fuzz licences soak package test-lowest test-pythons clean
+.PHONY: demo test test-slow test-all check docs reference architecture sensitivity fuzz licences soak package test-lowest \
+  test-pythons clean
 
 demo: $(READY)  ## simulated town to HTML report
 	$(BIN)/semgrid-eval demo

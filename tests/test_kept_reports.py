@@ -60,6 +60,7 @@ def test_the_readme_names_commands_scores_and_verdicts(tmp_path):
     assert (report / "summary.md").read_text() in text
     assert "| ED-DC is better than BL-DC on static classes and vehicles | " in text
     assert "| trainings | " in text
+    assert "| not run |" not in text
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from semgrid_eval.files import write_text
+from semgrid_eval.report.claims.findings import Verdict
 from semgrid_eval.report.estimates.bootstrap import Resampling, RowScores, score_regions
 from semgrid_eval.report.estimates.division import EVERYWHERE
 from semgrid_eval.report.page.provenance import data_sets
@@ -72,11 +73,10 @@ def facts(record: RunRecord, done: list[ResultRecord]) -> dict[str, str]:
 
 
 def claims(findings: pd.DataFrame) -> str:
-    """Give a table of the claims with their verdicts, nothing where none could be tested."""
-    if findings.empty:
-        return ""
-    lines = [f"| {line.claim} | {line.verdict} |" for line in findings.drop_duplicates("name").itertuples()]
-    return "\n".join(["| claim | verdict |", "|---|---|", *lines])
+    """Give a table of the claims that could be tested with their verdicts, nothing where there are none."""
+    tested = findings[findings["verdict"] != Verdict.NOT_RUN].drop_duplicates("name")
+    lines = [f"| {line.claim} | {line.verdict} |" for line in tested.itertuples()]
+    return "\n".join(["| claim | verdict |", "|---|---|", *lines]) if lines else ""
 
 
 def choices(run: Path) -> str:
@@ -97,7 +97,7 @@ def choices(run: Path) -> str:
 def default_of(name: str, names: Collection[str]) -> str:
     """Name the row that another one changes: the longest name that it begins with, or the default of its family."""
     usual = name.partition("-")[0] + DEFAULT
-    begun = [other for other in names if name.startswith(f"{other}-") and usual in names]
+    begun = [other for other in names if name.startswith(f"{other}-")] if usual in names else []
     return max(begun, key=len, default=usual)
 
 
