@@ -39,7 +39,7 @@ PARTS = (*USUAL, *_LONG)
 def measure(
     parts: Sequence[str], settings: Settings, *, device: torch.device, progress: Progress = silent
 ) -> dict[str, list[Measurement]]:
-    """Measure parts of `PARTS` in their order, in this process.
+    """Measure parts of `PARTS` in their order, in this process; memory, report and demo in processes of their own.
 
     Raises:
         ConfigError: a part is not known.
