@@ -1,7 +1,7 @@
 """Grids of whole recordings: read a log once, make the grids of every sensor, keep them by digest."""
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, islice
@@ -42,6 +42,7 @@ class GridDataSet:
 
     recordings: list[KeptRecording] = field(default_factory=list)
     failed: dict[str, str] = field(default_factory=dict)
+    splits: set[str] = field(default_factory=set)  # of all logs, also of those of which no grids were asked for
     built: int = 0
     reused: int = 0
 
@@ -52,13 +53,15 @@ def build_grids(
     config: GridConfig,
     *,
     sensors: Sequence[str] | None = None,
+    splits: Collection[str] | None = None,
     executor: Executor | None = None,
     progress: Progress = silent,
 ) -> GridDataSet:
     """Make the grids of all logs, or take those that lie in `folder` already, as many at once as `executor` works on.
 
     A log that fails is noted with its reason and the others go on. The order of recordings is that of `logs`. Grids of
-    all sensors are made; with `sensors`, recordings have those of these and of the target. No cell stays in memory.
+    all sensors are made; with `sensors`, recordings have those of these and of the target. With `splits`, logs of other
+    splits are left alone. No cell stays in memory.
     """
     data = GridDataSet()
     remove_stale(folder)
@@ -66,7 +69,10 @@ def build_grids(
     missing: list[Path] = []
     for log in logs:
         try:
-            ready[log] = _only(_find(log, folder, config), sensors)
+            kept = _kept(log, folder, config)
+            data.splits.add(kept.split)
+            if splits is None or kept.split in splits:
+                ready[log] = _only(_find(log, kept), sensors)
         except ResultError as error:
             missing.append(log)  # not made yet, or damaged
             if error.path and error.path.exists():
@@ -81,7 +87,7 @@ def build_grids(
         if failure is not None:
             data.failed[str(log)] = failure.reason if isinstance(failure, WorkerDied) else failure
             continue
-        ready[log] = _only(_find(log, folder, config), sensors)
+        ready[log] = _only(_find(log, _kept(log, folder, config)), sensors)
         data.built += 1
     data.recordings = [recording for log in logs for recording in ready.get(log, [])]
     return data
@@ -194,23 +200,23 @@ def _build_and_keep(log: Path, folder: Path, config: GridConfig) -> str | None:
     return None
 
 
-def _find(log: Path, folder: Path, config: GridConfig) -> list[KeptRecording]:
-    kept = _kept(log, folder, config)
+def _find(log: Path, kept: "_Kept") -> list[KeptRecording]:
     return find_recordings(kept.file, log, owner=kept.key, recovered=kept.recovered)
 
 
 class _Kept(NamedTuple):
-    """Where the grids of a log are kept, the digest by which they are sealed, and what the log lost."""
+    """Where the grids of a log are kept, the digest by which they are sealed, its split, and what the log lost."""
 
     file: Path
     key: str
+    split: str
     recovered: str
 
 
 def _kept(log: Path, folder: Path, config: GridConfig) -> _Kept:
     with LogReader(log) as reader:
         key = grid_key(reader.digest, config)
-        return _Kept(folder / grid_file(log.stem, key), key, str(reader.recovered() or ""))
+        return _Kept(folder / grid_file(log.stem, key), key, reader.scene.split, str(reader.recovered() or ""))
 
 
 def grid_key(log_digest: str, config: GridConfig) -> str:

@@ -50,7 +50,7 @@ class RunData:
     """Grids of a folder of logs, made when a row first asks for them, kept in the folder `cache` and put on `device`.
 
     On a CPU what windows are taken from is a file there that is mapped into memory. `rows` are all rows of the matrix:
-    they tell which sensors are needed.
+    they tell which sensors and splits are needed.
     """
 
     def __init__(
@@ -61,9 +61,11 @@ class RunData:
         self.cache, self._executor, self._stage = cache, executor, stage
         self._storage = Storage(device, cache, stage)
         self._configs = {grid_digest(row.grid): row.grid for row in rows}
-        self._sensors = defaultdict[str, list[str]](list)
+        self._sensors, self._splits = defaultdict[str, list[str]](list), defaultdict[str, set[str]](set)
         for row in rows:
-            self._sensors[grid_digest(row.grid)].extend(row.sensors)
+            key = grid_digest(row.grid)
+            self._sensors[key].extend(row.sensors)
+            self._splits[key].update(row.splits)
         self._sets: dict[str, GridDataSet] = {}
         self._stacked: dict[tuple[str, str], GridData] = {}
         self.failed: dict[str, str] = {}
@@ -108,7 +110,7 @@ class RunData:
         return self._stacked[key]
 
     def grids(self, config: GridConfig) -> GridDataSet:
-        """Return the grids of all recordings, on disk."""
+        """Return the grids of all recordings of which some row asks for them, on disk."""
         key = grid_digest(config)
         if key in self._sets:
             return self._sets[key]
@@ -117,7 +119,13 @@ class RunData:
                 self._sets[key] = GridDataSet(failed=misfits)  # which is the rows' fault: no log is to be told of
                 return self._sets[key]
             self._sets[key] = build_grids(
-                self._logs, self.cache, config, sensors=self._sensors[key], executor=self._executor, progress=progress
+                self._logs,
+                self.cache,
+                config,
+                sensors=self._sensors[key],
+                splits=self._splits[key],
+                executor=self._executor,
+                progress=progress,
             )
         self._note(self._sets[key])
         return self._sets[key]
@@ -160,11 +168,12 @@ class RunData:
 
     def _why_none(self, data_set: GridDataSet, split: str) -> str:
         """Say why there are no grids of a split: of the reasons for which all logs failed, the first."""
-        if len(data_set.failed) == len(self._logs):
+        known = data_set.splits
+        if data_set.failed and not data_set.recordings and (split in known or not known):
             log, reason = min(data_set.failed.items())
             first = reason.replace(log, str(Path(log).relative_to(self._folder)))
-            return f"none of the logs ({len(self._logs)}) gave grids; the first fails by: {first}"
-        found = ", ".join(sorted({record.split for record in self.records.values()}))
+            return f"none of the logs ({len(data_set.failed)}) gave grids; the first fails by: {first}"
+        found = ", ".join(sorted(known))
         return f"no recording of split {split!r} gave grids (splits found: {found})"
 
 

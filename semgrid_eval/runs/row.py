@@ -146,6 +146,12 @@ class Row(Config):
         return self.train_split if self.hold_out else self.validation_split
 
     @property
+    def splits(self) -> set[str]:
+        """The splits of which it needs grids: what learns nothing, none to train on."""
+        found = self.found_model()
+        return {self.scored_split} if found and not found.learns() else {self.scored_split, self.train_split}
+
+    @property
     def leads_frames(self) -> tuple[int, ...]:
         """Leads to train on, empty where it is the window's own alone."""
         return tuple(range(self.train_leads[0], self.train_leads[1] + 1)) if self.train_leads else ()

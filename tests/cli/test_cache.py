@@ -33,7 +33,7 @@ def test_the_example_lists_grids_and_towns_with_sizes_and_ages(place):
     assert (program, name, code) == ("semgrid-eval", "cache", 0)
     rows = [dict(zip(heads.split("\t"), line.split("\t"), strict=True)) for line in lines]
     assert [(row["folder"], row["kind"], row["number"]) for row in rows] == [
-        ("runs/first/grids", "grids", "5"),
+        ("runs/first/grids", "grids", "3"),
         ("logs/.towns", "town", "1"),
     ]
     assert rows[1]["days since use"] == "0.0 to 0.0"
@@ -44,17 +44,17 @@ def test_the_example_lists_grids_and_towns_with_sizes_and_ages(place):
 def test_cleaning_says_what_would_go_and_removes_it_only_with_yes(place):
     lost = place / "runs" / "first" / "grids" / "lost-0123456789abcdef.npz"
     said = call("runs/first", "logs", "--clean", "--run", "runs/first")
-    assert said == (0, [str(lost.relative_to(place))], ["would be removed: 1 of 6, 0.1 MB; --yes removes it"])
+    assert said == (0, [str(lost.relative_to(place))], ["would be removed: 1 of 4, 0.1 MB; --yes removes it"])
     assert lost.exists()
     said = call("runs/first", "logs", "--clean", "--run", "runs/first", "--yes")
-    assert said == (0, [str(lost.relative_to(place))], ["removed: 1 of 6, 0.1 MB"])
+    assert said == (0, [str(lost.relative_to(place))], ["removed: 1 of 4, 0.1 MB"])
     assert not lost.exists()
     assert call("runs/first", "--clean", "--run", "runs/first", "--yes")[1] == []
-    assert len(list((place / "runs" / "first" / "grids").glob("*.npz"))) == 4
+    assert len(list((place / "runs" / "first" / "grids").glob("*.npz"))) == 2
 
 
 def test_age_alone_takes_everything_that_is_older(place):
-    assert len(call("runs/first", "logs", "--clean", "--older-than", "0", "--yes")[1]) == 6
+    assert len(call("runs/first", "logs", "--clean", "--older-than", "0", "--yes")[1]) == 4
     assert call("runs/first")[0] == 1
     assert (place / "logs" / ".towns").is_dir()
     assert (place / "runs" / "first" / "run.json").is_file()

@@ -30,8 +30,8 @@ def names(kept):
 def test_every_file_of_grids_that_a_run_uses_is_its_own_and_no_other(place):
     kept = find_kept(place / "grids")
     assert {each.kind for each in kept} == {"grids"}
-    assert len(kept) == 8  # four logs, two configurations
-    assert len(uses_of([place / "usual"]).grids & names(kept)) == 4
+    assert len(kept) == 4  # two logs that are scored, two configurations
+    assert len(uses_of([place / "usual"]).grids & names(kept)) == 2
     assert uses_of([place / "usual", place / "fine"]).grids == names(kept)
     left = unused(kept, uses_of([place / "usual"]), None, NOW_S)
     assert names(left) == names(kept) - uses_of([place / "usual"]).grids
@@ -50,7 +50,7 @@ def test_what_a_cleaning_leaves_is_found_again_and_what_it_took_is_made_again(pl
 
 
 def test_answers_of_the_truth_are_kept_for_runs_on_logs_of_that_name(place, tmp_path):
-    for name in ("toy0-truth-0123456789abcdef.npz", "other-truth-0123456789abcdef.npz"):
+    for name in ("toy2-truth-0123456789abcdef.npz", "other-truth-0123456789abcdef.npz"):
         (tmp_path / name).touch()
     kept = find_kept(tmp_path)
     assert {each.kind for each in kept} == {"truth"}

@@ -1,6 +1,7 @@
 import dataclasses
 import json
 import re
+from shutil import copytree
 
 import numpy as np
 import pytest
@@ -268,6 +269,22 @@ def test_where_no_log_has_what_a_row_looks_at_the_row_says_so_and_no_log_is_at_f
     told = f"none of the logs ({len(SPLITS)}) gave grids; the first fails by: {reason}"
     assert [row.failure for row in record.rows] == [told, None]
     assert record.failed_logs == {}
+
+
+def test_logs_to_train_on_are_left_alone_where_no_row_learns(logs, tmp_path):
+    scored = {"name": "BL-DC", "model": "newest"}
+    for rows, splits in (([scored], {"val"}), ([scored, {"name": "ED-DC", "model": "ed"}], {"train", "val"})):
+        record = run(rows, logs, tmp_path / "run")
+        assert {log.split for log in record.logs} == splits
+        assert len(list((tmp_path / "grids").glob("*.npz"))) == len(record.logs)
+
+
+def test_a_split_that_no_log_is_of_is_told_as_that_beside_a_log_that_is_damaged(logs, tmp_path):
+    folder = tmp_path / "logs"
+    copytree(logs, folder)
+    (folder / "bad.mcap").write_bytes(b"no log")
+    record = run([{"name": "BL-none", "model": "newest", "validation_split": "test"}], folder, tmp_path / "run")
+    assert record.rows[0].failure == "no recording of split 'test' gave grids (splits found: train, val)"
 
 
 def test_where_every_log_is_damaged_the_row_says_so_and_each_is_named(logs, tmp_path):
