@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 import torch
-from support import spread
+import yaml
+from support import page_runs, spread
 from support.cityscapes_tree import Tree, put
 from support.small_runs import run
 from support.spread import begun, contents, losing_a_node
@@ -41,6 +42,9 @@ def cluster():
     from ray.cluster_utils import Cluster
 
     folder = Path(tempfile.mkdtemp(prefix="ray-"))  # pytest's are too long for the names of sockets
+    Path(tempfile.gettempdir(), "ray").mkdir(
+        exist_ok=True
+    )  # where Ray writes the cluster's address, wherever its files lie
     head = {"num_cpus": 1, "include_dashboard": False, "temp_dir": str(folder)}
     cluster = Cluster(initialize_head=True, head_node_args=head)
     for _ in range(NODES - 1):
@@ -125,6 +129,28 @@ def test_a_node_is_lost_in_each_of_convert_grids_and_run_and_all_bytes_are_those
     again = [sum(begun(tmp_path / name).values()) for name in ("converting", "building", "running")]
     assert again == [RECORDINGS + 1, RECORDINGS + 1, 7 + 1]  # what the lost node had begun was begun once more
     assert capsys.readouterr().out == ""
+
+
+def test_the_commands_of_the_page_run(cluster, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for split, city in (("train", "aachen"), ("val", "ulm")):
+        tree = Tree(Path("SRC"), split=split, city=city)
+        for name in tree.write(range(30)):
+            put(Path(f"PREDICTIONS/{name}_predLabelIds.png"), tree.label())
+    ed = {"features": 4, "depth": 2, "training": {"epochs": 1, "updates_per_epoch": 2, "batch": 2}}
+    rows = [{"name": "BL-DC", "model": "newest"}, {"name": "ED-SL2", "model": "ed", "settings": ed}]
+    Path("small.yaml").write_text(yaml.safe_dump({"rows": rows}))
+    instead = {"HOST:6379": cluster.address, "paper-cpu": "small.yaml", "16": "1"}
+    try:
+        page_runs.run("docs/cluster.md", instead=instead)
+    finally:
+        ray.shutdown()  # a command's process would end
+    found = {name: results.read_run(Path("runs") / name).rows for name in ("paper", "part", "whole")}
+    assert {name: [len(row.results) for row in rows] for name, rows in found.items()} == {
+        "paper": [1, 1],
+        "part": [0, 1],
+        "whole": [1, 1],
+    }
 
 
 def test_a_folder_that_other_machines_do_not_see_is_one_line(executor, tmp_path):

@@ -48,7 +48,7 @@ def lines(rows: Sequence[Row], logs: Sequence[Path]) -> Iterator[str]:
             cost_ms = costs[grid.model_dump_json()] = frame_ms(grid, logs)
         scores = IOU.means(class_iou(row.results[0].counts.sum(axis=0)))
         values = [f"{scores[name]:.3f}".removeprefix("0") for name in COLUMNS]
-        shares = [f"{area_m2 / of:.0%}" for area_m2, of in zip(areas_m2(row), plain, strict=True)]
+        shares = [f"{area_m2 / of:.0%}" if of else "-" for area_m2, of in zip(areas_m2(row), plain, strict=True)]
         yield f"| {' | '.join([row.name, *values, way.get(row.name, '-'), *shares, f'{cost_ms:.1f}'])} |"
 
 

@@ -1,61 +1,22 @@
-"""The commands of pages run one after the other, with less data and fewer rows where that is said here."""
+"""The commands of pages run one after the other."""
 
 import re
-import shlex
 from pathlib import Path
 
 import pytest
 from support.cityscapes_tree import Tree
 from support.commands import run_command
 from support.onnx_models import colour_network
-from support.pages import blocks, commands, text_of
-from support.toy_world import street
+from support.page_runs import run, toy_logs
+from support.pages import blocks, text_of
 
-from semgrid_eval.log.store import write_log
-
-TOWN = (
-    "--recordings 2 --towns 2 --val-towns 1 --val-share 0.5 --town-size-m 250 --duration-s 15 --width 128 --height 64"
-)
-LESS = {
-    "convert synthetic logs": f"{TOWN} --cache towns --workers 1",
-    "convert synthetic drives": f"{TOWN} --cache towns --workers 1 --frames 30",
-    "latency": "--frames 6 --warm-up 2",
-    "run paper-cpu": "--row BL-DC --row BL-Fuse --jobs 1",
-    "run real": "--row BL-DC --jobs 1",
-    "run disturb": "--row 'BL-DC*' --jobs 1",
-    "run stream-cpu": "--row 'newest +0' --row 'BL-Fuse +40' --row 'RN-town +0' --jobs 1",
-    "run baselines --model": "--row Mine --row BL-DC",
-}
-"""What is said last holds: options behind those of a page."""
 SHORTER = ("epochs: 8, updates_per_epoch: 150, batch: 8, schedule: {drop_epoch: 6}", "epochs: 1, updates_per_epoch: 2")
-FINDINGS = {"check logs --spec recording.yaml --strict": 1}
-"""Commands that are to find something, with their exit code: recordings of 1.7 s are too short for that contract."""
 
 
 @pytest.fixture
 def workplace(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def run(page, but=None):
-    """Run a page's commands, but for what installs and the command that begins with `but`."""
-    for line in commands(text_of(page)):
-        if not line.startswith("semgrid-eval "):
-            continue
-        line = line.removeprefix("semgrid-eval ")
-        if but and line.startswith(but):
-            continue
-        less = next((options for start, options in LESS.items() if line.startswith(start)), "")
-        words = [part for word in shlex.split(line) for part in (sorted(map(str, Path().glob(word))) or [word])]
-        ended = run_command(words + shlex.split(less))
-        assert ended.code == FINDINGS.get(line, 0), f"{line}\n{ended.err}"
-
-
-def toy_logs(folder, splits=("train", "val")):
-    for number, split in enumerate(splits):
-        world = street(number, frames=30, speed_mps=8.0, noise_px=0.05)
-        write_log(world.recording(f"toy_{number:06}_000000", split), Path(folder) / split / f"toy{number}.mcap")
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md"])

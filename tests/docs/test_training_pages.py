@@ -1,0 +1,54 @@
+"""Commands of pages that tell what was measured on whole data sets run on toy logs, with trainings of two updates."""
+
+from pathlib import Path
+
+import pytest
+from support.cityscapes_tree import Tree, put
+from support.page_runs import run, toy_logs
+from support.pages import blocks, text_of
+
+from semgrid_eval.scores.results import read_run
+
+SHORT = "models: {residual: {training: {epochs: 1, updates_per_epoch: 2, batch: 2}}}\n"
+FROZEN = "convert town-v1"  # has one size; toy logs are in its place
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(autouse=True)
+def workplace(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def failures(run_folder):
+    return {row.name: row.failure for row in read_run(Path(run_folder)).rows if row.failure}
+
+
+def test_model_card():
+    toy_logs("town")
+    (matrix,) = blocks("yaml", text_of("docs/model-card.md"))
+    assert "updates_per_epoch: 240" in matrix
+    Path("any.yaml").write_text(SHORT + matrix.replace("updates_per_epoch: 240", "updates_per_epoch: 2"))
+    run("docs/model-card.md", but=FROZEN, instead={"any/trainings/ID": "any/trainings/* shipped.safetensors"})
+    assert Path("shipped.safetensors").stat().st_size < 2_500_000
+
+
+def test_network():
+    toy_logs("town-v1/small")
+    toy_logs("real", ("val",))
+    for block in blocks("yaml", text_of("docs/network.md")):
+        named, _, matrix = block.partition("\n")
+        Path(named.removeprefix("# ")).write_text(SHORT * ("extends" not in matrix) + matrix)
+    run("docs/network.md")
+    assert not failures("run")
+    assert not failures("varied-town")
+    assert not failures("varied-real")
+
+
+def test_remedies():
+    toy_logs("LOGS")
+    tree = Tree(Path("TREE"))
+    for name in tree.write(range(20)):
+        put(Path(f"TREE/pred_sequence/{name}_labels.png"), tree.label())
+    Path("REAL.yaml").write_text(next(text for text in blocks("yaml", text_of("docs/remedies.md"))))
+    run("docs/remedies.md", but=FROZEN)
+    assert not {name: reason for name, reason in failures("RUN").items() if name.startswith("BL")}
