@@ -16,8 +16,7 @@ from pathlib import Path
 from semgrid_eval.grids.build import build_log
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.log.store import find_logs
-from semgrid_eval.report.estimates.bootstrap import Resampling, score_regions
-from semgrid_eval.report.estimates.division import EVERYWHERE
+from semgrid_eval.report.estimates.bootstrap import Resampling, score_everywhere
 from semgrid_eval.report.estimates.way import ways
 from semgrid_eval.report.rows.load import Row, load_runs
 from semgrid_eval.report.rows.pairing import HEADLINE
@@ -54,7 +53,7 @@ def lines(rows: Sequence[Row], logs: Sequence[Path]) -> Iterator[str]:
 
 def shares_of_way(rows: Sequence[Row]) -> dict[str, str]:
     """Return each row's share of the way from BL-DC to the ceiling, by the mean, with its interval."""
-    scores = score_regions(rows, IOU, EVERYWHERE, Resampling())["all"]
+    scores = score_everywhere(rows, IOU, Resampling())
     found = {entry.row.name: way.share(entry, HEADLINE) for entry, way in ways(scores)}
     return {name: f"{each.value:.0%} ({each.low:.0%} to {each.high:.0%})" for name, each in found.items()}
 

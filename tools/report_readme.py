@@ -12,8 +12,7 @@ import pandas as pd
 
 from semgrid_eval.files import write_text
 from semgrid_eval.report.claims.findings import Verdict
-from semgrid_eval.report.estimates.bootstrap import Resampling, RowScores, score_regions
-from semgrid_eval.report.estimates.division import EVERYWHERE
+from semgrid_eval.report.estimates.bootstrap import Resampling, RowScores, score_everywhere
 from semgrid_eval.report.page.provenance import data_sets
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.metrics.table import IOU
@@ -82,7 +81,7 @@ def claims(findings: pd.DataFrame) -> str:
 def choices(run: Path) -> str:
     """Give a table of rows against those in which nothing was changed, nothing where a run has no such rows."""
     (loaded,) = load_runs([run])
-    scores = score_regions([row for row in loaded.rows if row.results], IOU, EVERYWHERE, Resampling()).get("all", {})
+    scores = score_everywhere(loaded.rows, IOU, Resampling())
     lines = []
     for name, entry in scores.items():
         usual = scores.get(default_of(name, scores))

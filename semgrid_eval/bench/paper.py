@@ -9,7 +9,7 @@ from semgrid_eval.config import parse_config
 from semgrid_eval.grids.spec import GridConfig
 from semgrid_eval.models.network import TrainingConfig
 from semgrid_eval.report.claims.claims import in_paper
-from semgrid_eval.report.estimates.bootstrap import Resampling, RowScores, score_regions
+from semgrid_eval.report.estimates.bootstrap import Resampling, RowScores, score_everywhere
 from semgrid_eval.report.estimates.division import EVERYWHERE
 from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.load import Row as ReadRow
@@ -86,7 +86,7 @@ def scores_of(folder: Path, reference: Path) -> dict[str, dict[str, object]]:
     """
     (run,) = load_runs([folder])
     kept = kept_scores(reference)
-    scores = score_regions([row for row in run.rows if row.results], IOU, EVERYWHERE, Resampling()).get("all", {})
+    scores = score_everywhere(run.rows, IOU, Resampling())
     rows = {name: _row(entry, scores, kept.get(name)) for name, entry in scores.items()}
     failed = {row.name: row.failures[0] for row in run.rows if row.failures and not row.results}
     return rows | {name: {"failure": reason} for name, reason in failed.items()}

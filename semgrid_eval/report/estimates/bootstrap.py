@@ -244,6 +244,12 @@ def everywhere(everything: Everything, metric: str) -> Scores:
     return everything[metric][EVERYWHERE.name].get("all", {})
 
 
+def score_everywhere(rows: Iterable[Row], metric: Metric, resampling: Resampling) -> Scores:
+    """Score rows by a metric over all cells; rows without results or with nothing to count are left out."""
+    known = [row for row in rows if row.results]
+    return score_regions(known, metric, EVERYWHERE, resampling).get("all", {})
+
+
 def score_regions(rows: Sequence[Row], metric: Metric, division: Division, resampling: Resampling) -> dict[str, Scores]:
     """Score rows by a metric in each region of a division; regions and rows with nothing to count are left out."""
     sums = [row_sums(row, metric, division) for row in rows]

@@ -10,8 +10,7 @@ from pathlib import Path
 from semgrid_eval.errors import InputError
 from semgrid_eval.faults import meant, not_one_of
 from semgrid_eval.progress import Progress, silent
-from semgrid_eval.report.estimates.bootstrap import SEED, Level, Resampling, Scores, classes_of, score_regions
-from semgrid_eval.report.estimates.division import EVERYWHERE
+from semgrid_eval.report.estimates.bootstrap import SEED, Level, Resampling, Scores, classes_of, score_everywhere
 from semgrid_eval.report.estimates.intervals import Estimate
 from semgrid_eval.report.rows.load import Row, Run, comparable, load_runs
 from semgrid_eval.report.rows.pairing import changed_targets, settings_of
@@ -126,7 +125,7 @@ def hold(pairs: Sequence[tuple[Row, Row]], limits: Sequence[Limit], resampling: 
     for one, other in pairs:
         _require_comparable(one, other)
     both = [row for pair in pairs for row in pair]
-    scores = score_regions(both, iou_of(classes_of(both)), EVERYWHERE, resampling).get("all", {})
+    scores = score_everywhere(both, iou_of(classes_of(both)), resampling)
     return tuple(_verdict(scores, pair, limit) for pair in pairs for limit in limits)
 
 
