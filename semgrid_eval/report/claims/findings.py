@@ -43,6 +43,7 @@ class Outcome:
     difference: Estimate
     windows: int
     missing: tuple[str, ...] = ()  # what it needs, where it has no number
+    rows: tuple[int, ...] = ()  # numbers of the rows that are compared, where it has one
 
 
 @dataclass(frozen=True)
@@ -111,9 +112,7 @@ def sentence(findings: Sequence[Finding]) -> str:
 def finding_table(name: str, findings: Sequence[Finding]) -> Table:
     """Show the claims that were tested, each above the comparisons behind it."""
     bodies = tuple(
-        (Line(each.claim.text, (_verdict_cell(each.verdict), Cell(""), Cell(""))), *map(_line, each.outcomes))
-        for each in findings
-        if each.verdict is not Verdict.NOT_RUN
+        (_claim(each), *map(_line, each.outcomes)) for each in findings if each.verdict is not Verdict.NOT_RUN
     )
     columns = (("Verdict", ""), ("Score", ""), ("Difference", "95% interval"))
     caption = f"The paper's claims, the same against stronger baselines, and the residual network's{_tag(findings)}."
@@ -157,7 +156,8 @@ def _outcome(check: Check, places: Mapping[str, Scores]) -> Outcome:
     else:
         difference = weighted_sum([(weight, rows[name]) for name, weight in check.weights.items()], check.score)
     windows = min(rows[name].windows for name in check.weights)
-    return Outcome(check, judge(check.rule, difference), difference, windows)
+    numbers = tuple(rows[name].row.number for name in check.weights)
+    return Outcome(check, judge(check.rule, difference), difference, windows, rows=numbers)
 
 
 def _missing(check: Check, scored: Scores, near: Scores) -> tuple[str, ...]:
@@ -174,6 +174,11 @@ def _time_difference(check: Check, rows: Scores) -> Estimate:
     gaps = [float(np.mean(rows[a].row.window_ms) - np.mean(rows[b].row.window_ms)) for a, b in check.pairs]
     several = len(gaps) > 1
     return Estimate(float(np.mean(gaps)), min(gaps) if several else np.nan, max(gaps) if several else np.nan)
+
+
+def _claim(finding: Finding) -> Line:
+    rows = dict.fromkeys(number for outcome in finding.outcomes for number in outcome.rows)
+    return Line(finding.claim.text, (_verdict_cell(finding.verdict), Cell(""), Cell("")), rows=tuple(rows))
 
 
 def _line(outcome: Outcome) -> Line:

@@ -105,7 +105,7 @@ def command_table(runs: Sequence[Run]) -> Table:
         for row in run.rows:
             command = row_command(run.record.command, row.record.name, matrix_file(run, runs))
             cells = (Cell(row.record.label), Cell(_state(row)), Cell(command, tone="command"))
-            lines.append(Line(row.name, cells, row=row.number))
+            lines.append(Line(row.name, cells, rows=(row.number,)))
     return plain_table("commands", caption, "Row", ("What it does", "Results", "Command"), lines)
 
 
@@ -145,7 +145,9 @@ def result_table(runs: Sequence[Run]) -> Table:
     """List every result: its row, seed, id, windows and cost."""
     rows = [row for run in runs for row in run.rows]
     lines = [
-        Line(row.name, _result(each.record), "", row.record.label, row.number) for row in rows for each in row.results
+        Line(row.name, _result(each.record), "", row.record.label, (row.number,))
+        for row in rows
+        for each in row.results
     ]
     names = ("Seed", "Result", "Window set", "Windows", "Training", "Prediction", "Device")
     return plain_table("results", "Results behind the rows", "Row", names, lines)

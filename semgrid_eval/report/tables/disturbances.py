@@ -41,7 +41,7 @@ def _settings_but_disturbance(row: Row) -> dict[str, object]:
 
 def _card(base: RowScores, entries: Sequence[RowScores]) -> tuple[Line, ...]:
     values = tuple(value_cell(base.estimate(name), title=evidence(base, name)) for name in shared_iou([base]).compared)
-    head = Line(base.row.name, values, title=base.row.record.label, row=base.row.number)
+    head = Line(base.row.name, values, title=base.row.record.label, rows=(base.row.number,))
     return (
         head,
         *(Line(entry.row.disturbed, _losses(entry, base), "part", entry.row.record.label) for entry in entries),

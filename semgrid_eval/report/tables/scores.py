@@ -75,7 +75,7 @@ def confusion_table(entry: RowScores, name: str) -> Table:
     lines = []
     for target, of_target, counted in zip(labels, shares.tolist(), counts.tolist(), strict=True):
         cells = [_share_cell(*each, target) for each in zip(of_target, counted, labels, strict=True)]
-        lines.append(Line(target, tuple(cells)))
+        lines.append(Line(target, tuple(cells), rows=(entry.row.number,)))
     caption = f"{entry.row.name}: how each class of the target (line) is predicted (column), in percent of its cells."
     return plain_table(name, caption, "Target", labels, lines)
 
@@ -100,7 +100,7 @@ def cost_table(rows: Sequence[RowScores]) -> Table:
             _time_cell("ms a window", entry.row.window_ms, 1),
             Cell(", ".join(sorted({record.device for record in records}))),
         )
-        lines.append(Line(entry.row.name, cells, row=entry.row.number))
+        lines.append(Line(entry.row.name, cells, rows=(entry.row.number,)))
     columns = ("Parameters", "Results", "Training", "Prediction", "Device")
     return plain_table("costs", "What each row cost; times are means over seeds.", "Row", columns, lines)
 
@@ -160,7 +160,7 @@ def changes_table(scores: Scores) -> Table | None:
             continue
         cells = (Cell("; ".join(changed)), *(_change(entry, base, column) for column in iou.compared))
         sign = MINUS if comparable(entry.row, base.row) else "beside"
-        lines.append(Line(f"{entry.row.name} {sign} {base.row.name}", cells, row=entry.row.number))
+        lines.append(Line(f"{entry.row.name} {sign} {base.row.name}", cells, rows=(entry.row.number,)))
     caption = (
         "What each row changes against the row above it that has the same model and the fewest other settings, "
         "and the difference of their scores. Where the targets are others, both scores are shown instead."

@@ -52,7 +52,7 @@ def _line(strategy: Strategy, warm: Scores, moving: Scores) -> Line:
     share = record.misses / max(1, record.evaluations)
     cells.append(Cell(f"{share:.1%}", share, f"of {record.evaluations:,}", f"{record.misses:,} without an answer"))
     kind = "truth" if entry.row.uses_truth else ""
-    return Line(strategy.name, tuple(cells), kind, entry.row.record.label, entry.row.number)
+    return Line(strategy.name, tuple(cells), kind, entry.row.record.label, (entry.row.number,))
 
 
 def _value(entry: RowScores, column: str) -> Cell:
@@ -99,7 +99,7 @@ def _wins(strategy: Strategy, plain: Strategy) -> Iterator[Line]:
         added = f"+{added_ms:g} ms" if added_ms else ""
         kind = "part" if place else "truth" if entry.row.uses_truth else ""
         header = added if place else f"{strategy.name} {added}".rstrip()
-        yield Line(header, tuple(cells), kind, entry.row.record.label, strategy.measured.row.number)
+        yield Line(header, tuple(cells), kind, entry.row.record.label, (strategy.measured.row.number,))
 
 
 def _won(won: Estimate) -> Cell:
@@ -129,7 +129,7 @@ def _best_leads(series: LeadSeries) -> Line:
         note = f"{lead.low:.0f} to {lead.high:.0f}" if math.isfinite(lead.low) else ""
         cells.append(Cell(f"{lead.value:.0f}", finite(lead.value), note, evidence(entry, column)))
     first, last = series.entries[0], series.entries[-1]
-    return Line(f"{first.row.name} to {last.row.name}", tuple(cells), "", first.row.record.label, first.row.number)
+    return Line(f"{first.row.name} to {last.row.name}", tuple(cells), "", first.row.record.label, (first.row.number,))
 
 
 def stream_sentence(found: Sequence[Strategy]) -> str:

@@ -25,13 +25,13 @@ class Cell:
 
 @dataclass(frozen=True)
 class Line:
-    """One line of a table: its header, its cells, a kind for its style, a tooltip, and the number of its row."""
+    """One line of a table: its header, its cells, a kind for its style, a tooltip, numbers of rows that it is about."""
 
     header: str
     cells: tuple[Cell, ...]
     kind: str = ""
     title: str = ""
-    row: int = 0  # 0 where it is about none
+    rows: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

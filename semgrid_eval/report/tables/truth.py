@@ -35,7 +35,7 @@ def way_table(scores: Scores, moving: Scores, rows: Sequence[Row]) -> Table | No
         there = near.get(entry.row.name)
         cells += [_share(*there, column) if there else Cell(ABSENT) for column in iou.moving]
         kind = "truth" if entry.row.uses_truth else ""
-        lines.append((Line(entry.row.name, tuple(cells), kind, entry.row.record.label, entry.row.number),))
+        lines.append((Line(entry.row.name, tuple(cells), kind, entry.row.record.label, (entry.row.number,)),))
     lower = ", ".join(dict.fromkeys(way.lower.row.name for _, way in found))
     upper = ", ".join(dict.fromkeys(way.upper.row.name for _, way in found))
     caption = _WAY.replace("{lower}", lower).replace("{upper}", upper)

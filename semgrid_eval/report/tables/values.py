@@ -104,7 +104,7 @@ def _value_body(entry: RowScores, best: Mapping[str, set[str]], *, beside_paper:
         for name, rows in best.items()
     )
     name = entry.row.name
-    lines = [Line(name, values, "truth" if entry.row.uses_truth else "", entry.row.record.label, entry.row.number)]
+    lines = [Line(name, values, "truth" if entry.row.uses_truth else "", entry.row.record.label, (entry.row.number,))]
     paper = paper_table().get(entry.row.record.name, {}) if beside_paper else {}
     if set(best) <= set(paper):
         source = f"the paper's {entry.row.record.name}, Table A1: mean over 20 seeds, Cityscapes"
@@ -133,7 +133,7 @@ def _differences(
 
 def _difference_line(entry: RowScores, other: RowScores, columns: Sequence[str]) -> Line:
     cells = tuple(_difference(entry, other, column) for column in columns)
-    return Line(f"{entry.row.name} {MINUS} {other.row.name}", cells, row=entry.row.number)
+    return Line(f"{entry.row.name} {MINUS} {other.row.name}", cells, rows=(entry.row.number,))
 
 
 def _difference(entry: RowScores, other: RowScores, column: str) -> Cell:
@@ -156,9 +156,9 @@ def side_by_side(tables: Mapping[str, Table | None]) -> Table | None:
     lines = {part: {body[0].header: body[0] for body in table.bodies} for part, table in parts.items()}
     first = next(iter(parts.values()))
     absent = Line("", (Cell(ABSENT),) * len(first.columns))
-    rows = {header: line.row for found in lines.values() for header, line in found.items()}
+    rows = {header: line.rows for found in lines.values() for header, line in found.items()}
     bodies = tuple(
-        (Line(header, tuple(c for found in lines.values() for c in found.get(header, absent).cells), row=row),)
-        for header, row in rows.items()
+        (Line(header, tuple(c for found in lines.values() for c in found.get(header, absent).cells), rows=about),)
+        for header, about in rows.items()
     )
     return replace(first, columns=columns, bodies=bodies)

@@ -7,6 +7,10 @@
   const boxes = (set) => [...set.querySelectorAll("input")];
   const names = Object.entries(JSON.parse(chooser.dataset.names));
   const marked = [...document.querySelectorAll("[data-row]")].map((part) => [part, part.dataset.row.split(" ")]);
+  // What holds nothing but parts of rows that are left out is left out, too.
+  const holders = [...document.querySelectorAll("main .table, main .plot, main details")]
+    .map((holder) => [holder, holder.querySelectorAll("[data-row]")])
+    .filter(([, parts]) => parts.length);
 
   const left = () => {
     const off = new Set();
@@ -23,6 +27,8 @@
   const apply = () => {
     const off = left();
     for (const [part, rows] of marked) part.classList.toggle("off", rows.every((row) => off.has(row)));
+    for (const [holder, parts] of holders)
+      if (!holder.dataset.row) holder.classList.toggle("off", [...parts].every((part) => part.classList.contains("off")));
     said.value = off.size ? `${names.length - off.size} of ${names.length}` : "all";
     chooser.classList.toggle("chosen", off.size > 0);
   };

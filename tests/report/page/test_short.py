@@ -105,6 +105,24 @@ def test_what_is_chosen_holds_for_tables_and_figures_and_is_part_of_the_address(
     assert "of 34" in browser.execute_script("return document.querySelector('.chooser output').value")
 
 
+def test_tables_figures_and_claims_of_which_no_row_is_left_are_left_out(browser, reference_page):
+    open_page(browser, reference_page, width=1280, end="#rows&families=RN")
+    browser.execute_script("document.querySelectorAll('details').forEach(part => { part.open = true; });")
+    confusions = _seen(browser, "[id^=caption-confusion]")
+    assert confusions
+    assert all(caption.startswith("RN") for caption in confusions)
+    empty = """
+    return [...document.querySelectorAll('main .table, main .plot')].filter(part => part.offsetParent).filter(part => {
+      const rows = [...part.querySelectorAll('[data-row]')];
+      return rows.length && rows.every(row => getComputedStyle(row).display === 'none');
+    }).length;
+    """
+    assert browser.execute_script(empty) == 0
+    claims = _seen(browser, "#table-findings tbody tr:first-child .name")
+    assert claims
+    assert all("RN" in claim for claim in claims), claims
+
+
 def test_rows_are_found_by_their_names_and_all_come_back(browser, reference_page):
     open_page(browser, reference_page, width=1280, end="#&names=sp2%2C+rn-nt")
     assert _shown(browser, "#chart") == ["RN-NT", "BL-Sp2", "ED-Sp2", "RN-Sp2"]
