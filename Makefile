@@ -31,7 +31,8 @@ SOAK ?= build/soak
 # What the installed wheel is tried with: the stages of the demo at their smallest, in a folder of its own.
 PACKAGE ?= build/package
 PACKAGE_COMMANDS := "convert synthetic logs --recordings 4 --towns 2 --town-size-m 250 --duration-s 15" "check logs" \
-  "run smoke --logs logs --out run" "report run" "play run ED-DC --logs logs --out play.mcap"
+  "run smoke --logs logs --out run" "report run" "play run ED-DC --logs logs --out play.mcap" \
+  "latency logs/val --model residual-town --frames 4 --warm-up 1 --out profile.json"
 
 .PHONY: demo test test-slow test-all check docs reference architecture sensitivity fuzz licences soak package test-lowest \
   test-pythons clean
@@ -44,13 +45,14 @@ reference architecture sensitivity: $(READY)  ## a kept report (reports/README.m
 	for command in $(KEPT_COMMANDS); do $(BIN)/semgrid-eval $$command || exit 1; done
 	$(BIN)/python tools/report_readme.py $(KEPT)/$@ $(KEPT_REPORTS)/$@ $(KEPT_COMMANDS)
 
-test: $(READY)  ## the suite, but for what takes more than three seconds a test
-	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
+test: $(READY)  ## the suite, but for what takes more than three seconds a test: five minutes on two idle cores
+	$(BIN)/python -m pytest -rs -n auto --dist loadfile -m "not slow"
 
 test-slow: $(READY)  ## the rest of it: whole chains, kills, clusters, pages run from end to end
-	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
+	$(BIN)/python -m pytest -rs -n auto --dist loadfile -m slow
 
-test-all: $(READY)  ## all of it: the suite with a real viewer, the site, the wheel, lowest and other versions, a longer fuzz
+test-all: $(READY)  ## all of it: the suite with real viewers, the site, the wheel, lowest and other versions, the fuzz
+	$(BIN)/python -m pip install --quiet --editable '.[viewers]'
 	SEMGRID_VIEWERS=1 $(BIN)/python -m pytest -n auto --dist loadfile -rs
 	$(MAKE) docs package test-lowest test-pythons fuzz
 

@@ -42,6 +42,7 @@ R = TypeVar("R")
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = ROOT / "reports" / "reference"
+CARRIED_MB = 50
 BUDGET_S = {"tests": 90, "rates": 150, "paper": 270}
 """The parts, and for how many seconds each may work unless it is said otherwise."""
 PRESET_S = 200
@@ -240,15 +241,17 @@ def row_line(name: str, row: dict[str, Any]) -> str:
     return ", ".join([*parts, f"trained {row['train_seconds']} s" if row["train_seconds"] else "not trained"])
 
 
-def pack(chosen: argparse.Namespace) -> None:
-    """Make what is carried: the grids of logs."""
+def pack(chosen: argparse.Namespace) -> int:
+    """Make what is carried, the grids of logs; 1 where that, with what lies beside it, is more than can be carried."""
     rows = paper_matrix().rows
     workers = Processes(available_cores())
     cache, cpu = chosen.cache or chosen.out.with_name(f"{chosen.out.name}-cache"), torch.device("cpu")
     data = RunData(chosen.logs, cache, rows, executor=workers, device=cpu, stage=silent_stage)
     pack_grids(data, GridConfig(), chosen.out / "grids")
     size = sum(path.stat().st_size for path in chosen.out.rglob("*") if path.is_file())
-    sys.stdout.write(f"{chosen.out}: {size / 1e6:.1f} MB, {len(data.failed)} logs failed\n")
+    too_much = f": more than the {CARRIED_MB} MB that can be carried" if size > CARRIED_MB * 1e6 else ""
+    sys.stdout.write(f"{chosen.out}: {size / 1e6:.1f} MB, {len(data.failed)} logs failed{too_much}\n")
+    return int(bool(too_much))
 
 
 def budget(text: str) -> tuple[str, float]:
@@ -286,12 +289,11 @@ def main() -> int:
     """Do what the command line says; 1 where a part failed."""
     chosen = parser().parse_args()
     if chosen.command == "pack":
-        pack(chosen)
-    elif chosen.command == "part":
+        return pack(chosen)
+    if chosen.command == "part":
         CHECKS.get(chosen.name, check_preset)(place_of(chosen, chosen.name))
-    else:
-        return 0 if run_parts(chosen) else 1
-    return 0
+        return 0
+    return 0 if run_parts(chosen) else 1
 
 
 if __name__ == "__main__":

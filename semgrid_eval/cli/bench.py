@@ -57,6 +57,8 @@ def command(only: str | None, device: str, json_file: Path | None, *, quick: boo
     for part, rows in found.items():
         for row in rows:
             click.echo(f"{part:<11}{row.what:<52}{_number(row.value):>8} {row.unit:<15}{_verdict(row)}".rstrip())
+    if chosen.type == "cpu":
+        click.echo("gpu        not measured: --device cuda; what a GPU is held to is measured by tools/gpu_check.py")
 
 
 def _number(value: float) -> str:

@@ -124,4 +124,4 @@ def test_what_the_page_says_is_refused_is_what_bad_bags_end_with():
 
 def told(page):
     """The lines of tables of what is wrong."""
-    return [line for _, line in re.findall(r"^\| [^|]+ \| (`+)(.+?)\1 \|$", page, re.MULTILINE)]
+    return [line.strip() for _, line in re.findall(r"^\| [^|]+ \| (`+)(.+?)\1 \|$", page, re.MULTILINE)]

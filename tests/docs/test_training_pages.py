@@ -1,4 +1,4 @@
-"""Commands of pages that tell what was measured on whole data sets run on toy logs, with trainings of two updates."""
+"""Commands of pages that tell what was measured on whole data sets run on small ones, with trainings of two updates."""
 
 from pathlib import Path
 
@@ -30,6 +30,14 @@ def test_model_card():
     Path("any.yaml").write_text(SHORT + matrix.replace("updates_per_epoch: 240", "updates_per_epoch: 2"))
     run("docs/model-card.md", but=FROZEN, instead={"any/trainings/ID": "any/trainings/* shipped.safetensors"})
     assert Path("shipped.safetensors").stat().st_size < 2_500_000
+
+
+def test_town():
+    toy_logs("REAL")
+    toy_logs("town")
+    run("docs/town.md", but=FROZEN)
+    assert list(Path("matched").rglob("*.mcap"))
+    assert Path("run/report/index.html").is_file()
 
 
 def test_network():

@@ -16,10 +16,8 @@ TOWN = (
     "--recordings 2 --towns 2 --val-towns 1 --val-share 0.5 --town-size-m 250 --duration-s 15 --width 128 --height 64"
 )
 LESS = {
-    "convert synthetic logs": f"{TOWN} --cache towns --workers 1",
-    "convert synthetic fixed": f"{TOWN} --cache towns --workers 1",
-    "convert synthetic varied": f"{TOWN} --cache towns --workers 1",
     "convert synthetic drives": f"{TOWN} --cache towns --workers 1 --frames 30",
+    "convert synthetic": f"{TOWN} --cache towns --workers 1",
     "latency": "--frames 6 --warm-up 2",
     "run paper-cpu": "--row BL-DC --row BL-Fuse --jobs 1",
     "run real": "--row BL-DC --jobs 1",

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.recordings import random_recording
+from support.small_runs import SPLITS, write_logs
 
 from semgrid_eval.bench.archives import pack_run
 from semgrid_eval.bench.paper import kept_scores, matrix_of_grids
@@ -120,6 +121,17 @@ def test_a_preset_is_trained_on_grids_alone_and_what_it_trained_is_found_where_t
     (back,), (again,) = (load_runs([folder]) for folder in (tmp_path / "back" / "run", tmp_path / "again"))
     ids = [{row.name: row.results[0].record.id for row in run.rows if "-DC" in row.name} for run in (back, again)]
     assert ids[0] == ids[1]
+
+
+def test_grids_are_packed_and_more_than_can_be_carried_is_told(tool, tmp_path, monkeypatch, capsys):
+    logs = write_logs(tmp_path / "logs")
+    words = ["gpu_check.py", "pack", str(tmp_path / "carry"), "--logs", str(logs)]
+    for limit_mb, code in ((50, 0), (0.001, 1)):
+        monkeypatch.setattr(tool, "CARRIED_MB", limit_mb)
+        monkeypatch.setattr(sys, "argv", words)
+        assert tool.main() == code
+        assert ("more than" in capsys.readouterr().out) == bool(code)
+    assert len(list((tmp_path / "carry" / "grids").rglob("*.npz"))) == len(SPLITS)
 
 
 def test_archives_of_a_run_stay_below_what_comes_through(tmp_path, monkeypatch):

@@ -3,14 +3,16 @@
 import re
 import shutil
 import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from support.small_runs import run, write_logs
 
 from semgrid_eval.playback.write import Play, write_playback
 
-RERUN = shutil.which("rerun")
-pytestmark = pytest.mark.skipif(RERUN is None, reason="no `rerun` is installed (pip install rerun-sdk)")
+RERUN = shutil.which("rerun") or shutil.which("rerun", path=Path(sys.executable).parent)
+pytestmark = pytest.mark.skipif(RERUN is None, reason="no `rerun` is installed (the extra `viewers`)")
 PICTURES = ("legend", "target/picture", "prediction/1/picture", "prediction/2/picture", "certainty/2/picture")
 
 

@@ -68,5 +68,5 @@ def _begin(kind: Kind, bad: Bad) -> str:
 
 
 def _code(text: str) -> str:
-    ticks = "``" if "`" in text else "`"
-    return f"{ticks}{text}{ticks}".replace("|", "\\|")
+    shown = f"`` {text} ``" if "`" in text else f"`{text}`"
+    return shown.replace("|", "\\|")
