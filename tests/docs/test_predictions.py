@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from support import page_runs
 from support.pages import blocks, text_of
 from support.small_runs import run
 from support.toy_world import street
@@ -43,3 +44,5 @@ def test_the_example_writes_logs_that_its_rows_score(tmp_path, monkeypatch):
     assert (counts["NODE"] != counts["BL-NT"]).any()
     exec(export, {})
     assert [path.name for path in Path("exported").iterdir()] == ["drive.mcap"]
+    page_runs.run("docs/predictions.md")
+    assert Path("live.mcap").is_file()
