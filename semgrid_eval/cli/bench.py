@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from semgrid_eval.cli.console import complain, loudness_options, progress
+from semgrid_eval.cli.console import complain, loudness_options, progress, say
 
 if TYPE_CHECKING:
     from semgrid_eval.bench.measurement import Measurement
@@ -58,7 +58,7 @@ def command(only: str | None, device: str, json_file: Path | None, *, quick: boo
         for row in rows:
             click.echo(f"{part:<11}{row.what:<52}{_number(row.value):>8} {row.unit:<15}{_verdict(row)}".rstrip())
     if chosen.type == "cpu":
-        click.echo("gpu        not measured: --device cuda; what a GPU is held to is measured by tools/gpu_check.py")
+        say("Not measured: a GPU (--device cuda); what one is held to is measured by tools/gpu_check.py.")
 
 
 def _number(value: float) -> str:

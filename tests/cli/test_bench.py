@@ -60,6 +60,7 @@ def test_the_example_measures_the_parts_that_it_names(tiny):
     assert done.exit_code == 0, done.output
     assert {line.split()[0] for line in done.stdout.splitlines()[1:]} == {"training", "prediction"}
     assert "f 2, against the textbook" in done.stdout
+    assert "Not measured: a GPU" in done.stderr
 
 
 @pytest.mark.slow

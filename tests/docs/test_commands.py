@@ -75,7 +75,7 @@ def test_shell_and_gate(workplace):
     town.mkdir(parents=True)
     (town / "town.json").write_text("{}")
     run("docs/shell.md")
-    assert len(list(Path("runs/first/grids").glob("*.npz"))) == 3  # those of a run that is named stay
+    assert len(list(Path("runs/first/grids").glob("*.npz"))) == 2  # those of a run that is named stay
     run("docs/gate.md")
     assert Path("page/index.html").is_file()
 
