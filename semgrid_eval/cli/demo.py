@@ -23,7 +23,7 @@ TOWNS = 8
 @workers_option("Processes at once.")
 @loudness_options
 def command(out: Path, recordings: int, seed: int, device: str, workers: int) -> int:
-    """Simulate a town, record drives through it as logs, train, score and report: some eight minutes on two cores.
+    """Simulate a town, record drives through it as logs, train, score and report: ten minutes on two cores.
 
     Prints the path of the finished page. Finished work is kept; run the same command again to continue.
     """
