@@ -9,7 +9,8 @@ from support.pages import blocks, text_of
 
 from semgrid_eval.scores.results import read_run
 
-SHORT = "models: {residual: {training: {epochs: 1, updates_per_epoch: 2, batch: 2}}}\n"
+TRAINING = "training: {epochs: 1, updates_per_epoch: 2, batch: 2}"
+SHORT = f"models: {{residual: {{{TRAINING}}}, ed: {{features: 4, {TRAINING}}}}}\n"
 FROZEN = "convert town-v1"  # has one size; toy logs are in its place
 pytestmark = pytest.mark.slow
 
@@ -45,11 +46,13 @@ def test_network():
     toy_logs("real", ("val",))
     for block in blocks("yaml", text_of("docs/network.md")):
         named, _, matrix = block.partition("\n")
-        Path(named.removeprefix("# ")).write_text(SHORT * ("extends" not in matrix) + matrix)
+        Path(named.removeprefix("# ")).write_text(SHORT * ("extends: errors" not in matrix) + matrix)
     run("docs/network.md")
     assert not failures("run")
     assert not failures("varied-town")
     assert not failures("varied-real")
+    recipe = {row.name: len(row.results) for row in read_run(Path("recipe")).rows}
+    assert recipe["ED-DC-recipe"] == recipe["ED-DC"] == recipe["RN-DC"] == 1
 
 
 def test_remedies():
