@@ -11,7 +11,17 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, StrMethodFormatter
 
 from semgrid_eval.report.estimates.bootstrap import RowScores, Scores
-from semgrid_eval.report.figures.style import INK, SETTINGS, Plot, finish, line_style, mark, mark_legend, short
+from semgrid_eval.report.figures.style import (
+    INK,
+    SETTINGS,
+    Plot,
+    finish,
+    line_style,
+    line_styles,
+    mark,
+    mark_legend,
+    short,
+)
 from semgrid_eval.report.rows.load import Result, Row
 from semgrid_eval.scores.metrics.table import CALIBRATION
 
@@ -44,9 +54,9 @@ def calibration_plots(scores: Scores) -> list[Plot]:
         figure = Figure(figsize=(7.4, 4.6), layout="constrained")
         right, cells = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
         right.plot([0, 1], [0, 1], color=INK, linewidth=0.8, linestyle=":")
-        for index, (entry, table) in enumerate(curves, start=1):
+        for (entry, table), stroke in zip(curves, line_styles([entry.row for entry, _ in curves]), strict=True):
             error = entry.mean["calibration_error"]
-            style = line_style(index) | {"label": f"{short(entry.row.name)}, error {error:.3f}"}
+            style = stroke | {"label": f"{short(entry.row.name)}, error {error:.3f}"}
             drawn = right.plot(table.certainty, table.right, marker="o", markersize=3, **style)
             drawn += cells.plot(table.certainty, table.cells / table.cells.sum(), linewidth=1.2, **style)
             mark([entry.row], *drawn)

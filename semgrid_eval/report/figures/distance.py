@@ -21,7 +21,7 @@ def distance_plots(parts: Parts, rows: Sequence[Row]) -> list[style.Plot]:
     lines = _lines(parts, rows)
     if not lines or len(parts) < 2:
         return []
-    strokes, iou = _strokes(lines), shared_iou([line[0] for line in lines])
+    strokes, iou = style.line_styles([line[0].row for line in lines]), shared_iou([line[0] for line in lines])
     with mpl.rc_context(style.SETTINGS):
         rows_of_panels, columns = style.panel_grid(len(iou.compared))
         figure = Figure(figsize=(style.WIDE_IN, 2.7 * rows_of_panels), layout="constrained")
@@ -41,16 +41,6 @@ def distance_plots(parts: Parts, rows: Sequence[Row]) -> list[style.Plot]:
 def _short_band(name: str) -> str:
     """Shorten `20 to 40 m` to what fits below a tick."""
     return name.removesuffix(" m").replace(" to ", "\N{EN DASH}").replace("beyond ", "> ")
-
-
-def _strokes(lines: Sequence[Sequence[RowScores]]) -> list[dict[str, Any]]:
-    """Return how each line is drawn: in colours, and black where a row is told of the truth."""
-    rows = [line[0].row for line in lines]
-    told = style.truth_strokes(rows)
-    return [
-        {"color": style.INK, "linestyle": told[row.record.facts.model]} if row.uses_truth else style.line_style(index)
-        for index, row in enumerate(rows)
-    ]
 
 
 def _lines(parts: Parts, rows: Sequence[Row]) -> list[list[RowScores]]:

@@ -129,6 +129,15 @@ def line_style(index: int) -> dict[str, Any]:
     return {"color": PALETTE[index % colours], "linestyle": STROKES[index // colours % len(STROKES)]}
 
 
+def line_styles(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return how each row's line is drawn: in colours, and black where a row is told of the truth."""
+    told = truth_strokes(rows)
+    return [
+        {"color": INK, "linestyle": told[row.record.facts.model]} if row.uses_truth else line_style(index)
+        for index, row in enumerate(rows)
+    ]
+
+
 def panel_grid(count: int) -> tuple[int, int]:
     """Return in how many rows, of how many panels each, as many panels as that fit on a page."""
     rows = ceil(count / _PANELS_IN_A_ROW)

@@ -54,6 +54,30 @@ def _row(name, value=50, **kwargs):
     return counted_row(name, _hits(value, **kwargs))
 
 
+@pytest.mark.parametrize(
+    ("first", "others"),
+    [
+        ("RN-DC", ("BL-DC", "BL-Fuse", "BL-Table", "BL-Flow", "ED-DC")),
+        ("RN-SL5", ("BL-DC", "BL-Flow", "BL-Fuse-SL5", "ED-SL5")),
+    ],
+)
+def test_the_residual_network_has_to_be_above_each_of_its_rivals_in_every_category_and_near_moving_actors(
+    first, others
+):
+    rivals = [_row(other, 50) for other in others[:-1]] + [_row(others[-1], 50, small=60)]
+    found = _findings(_row(first, 60, small=[*[50] * (RECORDINGS - 2), 55, 60]), *rivals)
+    for other in others[:-1]:
+        claim = found[f"{first}-{other}"]
+        assert claim.verdict is HOLDS
+        assert [each.check.score for each in claim.outcomes] == [
+            "static_known", "vehicles", "small_static", "small_dynamic"
+        ]  # fmt: skip
+    assert found[f"{first}-{others[-1]}"].verdict is FAILS
+    for other in others:
+        near = found[f"{first}-moving-{other}"].claim.checks
+        assert [(check.score, check.region) for check in near] == [("vehicles", "moving"), ("person", "moving")]
+
+
 def test_a_claim_holds_where_every_interval_excludes_zero():
     found = _findings(_row("BL-DC", 50), _row("ED-DC", 60))["large-BL-DC"]
     assert found.verdict is HOLDS
@@ -240,7 +264,7 @@ def test_tables_and_records_tell_the_same():
     frame, records = finding_frame(found), finding_records(found)
     assert frame.verdict.tolist() == [each["verdict"] for each in records for _ in each["checks"]]
     assert frame[frame.name == "large-BL-DC"].comparison_verdict.tolist() == ["holds", "does not hold"]
-    whose = "Of 39 claims, the paper's and ours about stronger baselines"
+    whose = "Of 43 claims, the paper's and ours about stronger baselines"
     assert sentence(found) == f"{whose}, 2 can be tested here: 1 holds, 1 does not, 0 are undecided."
 
 

@@ -8,6 +8,7 @@ from support.fake_run import REFERENCE_ROWS, FakeRow, make_fake_run
 from semgrid_eval.report.estimates.bootstrap import Resampling, score_regions
 from semgrid_eval.report.estimates.division import of_cells
 from semgrid_eval.report.figures.distance import distance_plots
+from semgrid_eval.report.figures.style import INK, line_styles
 from semgrid_eval.report.rows.load import load_runs
 from semgrid_eval.scores.metrics.table import IOU
 from semgrid_eval.scores.regions.distance import DISTANCE
@@ -38,3 +39,10 @@ def test_without_bands_there_is_no_figure(rows):
     assert distance_plots({}, rows) == []
     assert distance_plots({"0 to 20 m": _parts(rows)["0 to 20 m"]}, rows) == []
     assert distance_plots(_parts(rows), []) == []
+
+
+def test_lines_are_in_colours_and_black_where_a_row_is_told_of_the_truth(rows):
+    colours = {row.name: style["color"] for row, style in zip(rows, line_styles(rows), strict=True)}
+    assert colours.pop("truth-motion") == INK
+    assert INK not in colours.values()
+    assert len(set(colours.values())) == len(rows) - 1
