@@ -44,6 +44,7 @@ from semgrid_eval.models.network import LossConfig, NetworkSettings, OptimizerCo
 from semgrid_eval.models.overlay import OverlaySettings
 from semgrid_eval.models.recorded import RecordedSettings
 from semgrid_eval.models.residual import ResidualSettings
+from semgrid_eval.models.residual_flow import ResidualFlowSettings
 from semgrid_eval.models.votes import DrawSettings
 from semgrid_eval.runs.matrix import _MatrixFile
 from semgrid_eval.runs.row import Row
@@ -79,6 +80,7 @@ MATRIX: tuple[tuple[str, type[Config]], ...] = (
     ("`settings` of all networks", NetworkSettings),
     ("`settings` of `ed`", EncoderDecoderSettings),
     ("`settings` of `residual`", ResidualSettings),
+    ("`settings` of `residual-flow`, beside those of `residual`", ResidualFlowSettings),
     ("`settings` of `overlay`", OverlaySettings),
     ("`settings` of `flow`", FlowSettings),
     ("`settings` of `ceiling` and `fresh`", DrawSettings),

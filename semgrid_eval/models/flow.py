@@ -62,12 +62,16 @@ class MoveOn(Baseline):
 
     def predict(self, batch: WindowBatch) -> Tensor:
         """Return BL-Fuse's overlay with what moves moved on, as certain scores: (B, C, H, W)."""
+        return one_hot(self.answer(batch), self.given.classes.count)
+
+    def answer(self, batch: WindowBatch) -> Tensor:
+        """Return BL-Fuse's overlay with what moves moved on: (B, H, W) uint8 class ids."""
         layers = torch.stack([overlay(grids) for grids in batch.past.flip(2).unbind(dim=2)], dim=1)  # newest first
         if layers.shape[1] < 2:
-            return one_hot(layers[:, 0], self.given.classes.count)
+            return layers[:, 0]
         lead_s = batch.lead_s.cpu().numpy()[:, ::-1]
         result = [self._moved_on(*window) for window in zip(layers.cpu().numpy(), lead_s, strict=True)]
-        return one_hot(torch.from_numpy(np.stack(result)).to(layers.device), self.given.classes.count)
+        return torch.from_numpy(np.stack(result)).to(layers.device)
 
     def _moved_on(self, layers: Grid, lead_s: NDArray[np.float32]) -> Grid:
         """Predict one window: layers (T, H, W) and their (T,) times to the target, newest first -> (H, W)."""

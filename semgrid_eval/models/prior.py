@@ -1,5 +1,7 @@
 """A table that a network starts from: the target's class given what the inputs last showed in the cell."""
 
+from collections.abc import Callable
+
 import torch
 from torch import Tensor, nn
 
@@ -12,6 +14,7 @@ COUNTED_WINDOWS = 1500  # at most, spread evenly over the training windows
 SMOOTHING_CELLS = 0.3  # added to each count, so that nothing is impossible
 FLOOR = -9.0  # of a log-probability, beside the likeliest class
 _BATCH = 50  # windows that are counted at once
+Shown = Callable[[WindowBatch], WindowBatch]
 
 
 class CellPrior(nn.Module):
@@ -26,13 +29,13 @@ class CellPrior(nn.Module):
         self._lead_bins, self._lead_span_s, self._classes = lead_bins, lead_span_s, given.classes.count
         self.table = nn.Parameter(torch.zeros(lead_bins * given.grids * self._classes**2, self._classes))
 
-    def count(self, windows: WindowSet) -> None:
-        """Set the table to what training windows show outside M."""
+    def count(self, windows: WindowSet, shown: Shown = lambda batch: batch) -> None:
+        """Set the table to what training windows, as they are `shown` to the network, show outside M."""
         counts = torch.full(self.table.shape, SMOOTHING_CELLS, dtype=torch.float64)
         wanted = min(COUNTED_WINDOWS, len(windows))
         chosen = torch.linspace(0, len(windows) - 1, wanted).round().long().to(windows.inputs.device)
         for part in torch.split(chosen, _BATCH):
-            batch = windows.batch(part)
+            batch = shown(windows.batch(part))
             cells = self._rows(batch) * self._classes + batch.target
             counts += torch.bincount(cells[~batch.mask], minlength=counts.numel()).cpu().view_as(counts)
         log = counts.log()

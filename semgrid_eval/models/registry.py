@@ -21,6 +21,7 @@ _HERE = "semgrid_eval.models"
 MODELS = {
     "ed": f"{_HERE}.encoder_decoder:EncoderDecoder",
     "residual": f"{_HERE}.residual:Residual",
+    "residual-flow": f"{_HERE}.residual_flow:ResidualFlow",
     "residual-town": f"{_HERE}.shipped:TownResidual",
     "newest": f"{_HERE}.newest:RepeatNewest",
     "overlay": f"{_HERE}.overlay:OverlaySensors",

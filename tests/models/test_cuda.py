@@ -19,7 +19,11 @@ SIZE, EPOCHS, UPDATES = 32, 2, 10
 # Small, so that loading kernels takes most of the time. Layers of zeros give gradients of rounding errors alone, which
 # optimisers that divide by their size make large: a network that starts from its table is not compared.
 CHANGES = AugmentConfig(flip=0.5, rotate_deg=2.0, misalign_cells=1)
-SMALL = {"ed": {"features": 16}, "residual": {"widths": [16, 32], "fine": 8, "shift": 1, "prior": False}}
+SMALL = {
+    "ed": {"features": 16},
+    "residual": {"widths": [16, 32], "fine": 8, "shift": 1, "prior": False},
+    "residual-flow": {"widths": [16, 32], "fine": 8, "prior": False},
+}
 
 
 def untrained(name, precision="float32", *, dropout=True):

@@ -30,6 +30,7 @@ SETTINGS = {
     "flow": {"small_speed_limit_mps": 10.0},
     "ed": {"features": 4, "depth": 2, "training": TRAINING, "prior": True},
     "residual": {"widths": [8, 8], "fine": 0, "shift": 1, "training": TRAINING},
+    "residual-flow": {"widths": [8, 8], "fine": 4, "training": TRAINING},
 }
 
 

@@ -78,6 +78,7 @@ MATRICES = {
     "`settings.shift` of `residual`, where nothing moves": row_text(
         "model: residual, settings: {shift: 2}, grid: {classes: still.yaml}"
     ),
+    "`residual-flow`, where nothing moves": row_text("model: residual-flow, grid: {classes: still.yaml}"),
 }
 
 

@@ -205,6 +205,8 @@ model: residual, settings: {widths: [0]}
 model: residual, settings: {fine: 257}
 model: residual, settings: {shift: 9}
 model: residual, settings: {lead_input: 1}
+model: residual-flow, window: {inputs: 1}
+model: residual-flow, settings: {flow: {overlap: 2}}
 model: residual-town, window: {inputs: 3}
 model: residual-town, translate: false
 model: residual-town, grid: {spec: {cell_m: 0.5}}

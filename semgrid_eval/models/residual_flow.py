@@ -1,0 +1,66 @@
+"""RN-Flow: a residual network that also sees where BL-Flow moves what moves (not in the paper)."""
+
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from semgrid_eval.classes import UNKNOWN
+from semgrid_eval.errors import ConfigError
+from semgrid_eval.models.flow import FlowSettings, MoveOn
+from semgrid_eval.models.model import Given
+from semgrid_eval.models.overlay import newest_first, overlay
+from semgrid_eval.models.residual import Residual, ResidualSettings
+from semgrid_eval.windows.data import WindowBatch, WindowSet
+
+
+class ResidualFlowSettings(ResidualSettings):
+    """Settings of an RN-Flow: those of an RN, and what it is shown."""
+
+    flow: FlowSettings = FlowSettings()  # what counts as evidence of motion; the network learns what it is worth
+
+
+class ResidualFlow(Residual):
+    """An RN with one more input, newer than all others: the cells in which BL-Flow's answer is not BL-Fuse's."""
+
+    Settings = ResidualFlowSettings
+
+    def __init__(self, settings: ResidualFlowSettings, given: Given) -> None:
+        super().__init__(settings, replace(given, inputs=given.inputs + 1))
+        self.given, self._flow = given, MoveOn(settings.flow, given)
+
+    @classmethod
+    def in_words(cls, settings: ResidualSettings) -> str:
+        """Say what the model does."""
+        return super().in_words(settings) + ", shown what moves on"
+
+    @classmethod
+    def check(cls, settings: ResidualSettings, given: Given) -> None:
+        """Refuse a single input, and classes that do not move: nothing would be shown."""
+        super().check(settings, given)
+        if given.inputs < 2:
+            raise ConfigError("motion is seen between two inputs, and there is one", field="window.inputs")
+        if not given.classes.movable:
+            raise ConfigError("no class of grid.classes moves, and that is what it is for", field="model")
+
+    def prepare(self, windows: WindowSet) -> None:
+        """Count the table over what it is shown."""
+        if self.prior is not None:
+            self.prior.count(windows, self._shown)
+
+    def forward(self, batch: WindowBatch) -> Tensor:
+        """Score the target: (B, C, H, W) logits."""
+        return super().forward(self._shown(batch))
+
+    def _shown(self, batch: WindowBatch) -> WindowBatch:
+        """Append what moves on, as an input of the first sensor at the time of the newest."""
+        shown = torch.full_like(batch.past[:, :, :1], UNKNOWN)  # (B, S, 1, H, W)
+        if not batch.past.is_meta:  # where only shapes are asked for
+            answer, still = self._flow.answer(batch), overlay(newest_first(batch))
+            shown[:, 0, 0] = torch.where(answer == still, UNKNOWN, answer)
+        return replace(
+            batch,
+            past=torch.cat([batch.past, shown], dim=2),
+            shift_cells=torch.cat([batch.shift_cells, batch.shift_cells[:, -1:]], dim=1),
+            lead_s=torch.cat([batch.lead_s, batch.lead_s[:, -1:]], dim=1),
+        )
