@@ -1,10 +1,12 @@
 """Commands of pages that tell what was measured on whole data sets run on small ones, with trainings of two updates."""
 
+import shlex
 from pathlib import Path
 
 import pytest
 from support.cityscapes_tree import Tree, put
-from support.page_runs import run, toy_logs
+from support.commands import run_command
+from support.page_runs import LESS, run, toy_logs
 from support.pages import blocks, text_of
 
 from semgrid_eval.scores.results import read_run
@@ -41,12 +43,27 @@ def test_town():
     assert Path("run/report/index.html").is_file()
 
 
+def named_matrices(page):
+    """Return the matrices of a page by the file that their first line names."""
+    begun = (block.partition("\n") for block in blocks("yaml", text_of(page)))
+    return {first.removeprefix("# "): matrix for first, _, matrix in begun if first.startswith("# ")}
+
+
+def test_ceiling():
+    assert run_command(["convert", "synthetic", "town-v1/small", *shlex.split(LESS["convert synthetic"])]).code == 0
+    (matrix,) = named_matrices("docs/ceiling.md").items()
+    Path(matrix[0]).write_text(matrix[1])
+    run("docs/ceiling.md")
+    assert not failures("run")
+    rows = read_run(Path("run")).rows
+    assert sum(row.name.startswith("ceiling") for row in rows) == 10
+
+
 def test_network():
     toy_logs("town-v1/small")
     toy_logs("real", ("val",))
-    for block in blocks("yaml", text_of("docs/network.md")):
-        named, _, matrix = block.partition("\n")
-        Path(named.removeprefix("# ")).write_text(SHORT * ("extends: errors" not in matrix) + matrix)
+    for file, matrix in named_matrices("docs/network.md").items():
+        Path(file).write_text(SHORT * ("extends: errors" not in matrix) + matrix)
     run("docs/network.md")
     assert not failures("run")
     assert not failures("varied-town")
