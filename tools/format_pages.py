@@ -44,7 +44,7 @@ from semgrid_eval.models.network import LossConfig, NetworkSettings, OptimizerCo
 from semgrid_eval.models.overlay import OverlaySettings
 from semgrid_eval.models.recorded import RecordedSettings
 from semgrid_eval.models.residual import ResidualSettings
-from semgrid_eval.models.residual_flow import ResidualFlowSettings
+from semgrid_eval.models.residual_flow import HintSettings, ResidualFlowSettings
 from semgrid_eval.models.votes import DrawSettings
 from semgrid_eval.runs.matrix import _MatrixFile
 from semgrid_eval.runs.row import Row
@@ -81,6 +81,7 @@ MATRIX: tuple[tuple[str, type[Config]], ...] = (
     ("`settings` of `ed`", EncoderDecoderSettings),
     ("`settings` of `residual`", ResidualSettings),
     ("`settings` of `residual-flow`, beside those of `residual`", ResidualFlowSettings),
+    ("... `flow`, beside those of `flow`", HintSettings),
     ("`settings` of `overlay`", OverlaySettings),
     ("`settings` of `flow`", FlowSettings),
     ("`settings` of `ceiling` and `fresh`", DrawSettings),

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import torch
+from pydantic import Field
 from torch import Tensor
 
 from semgrid_eval.classes import UNKNOWN
@@ -14,10 +15,20 @@ from semgrid_eval.models.residual import Residual, ResidualSettings
 from semgrid_eval.windows.data import WindowBatch, WindowSet
 
 
+class HintSettings(FlowSettings):
+    """What counts as evidence of motion: less than BL-Flow asks for, since the network learns what it is worth."""
+
+    least_motion_cells: float = Field(1.0, gt=0)
+    size_ratio: float = Field(0.3, ge=0, le=1)
+    overlap: float = Field(0.2, ge=0, le=1)
+    seen: float = Field(0.2, ge=0, le=1)
+    still_there: float = Field(0.6, ge=0, le=1)
+
+
 class ResidualFlowSettings(ResidualSettings):
     """Settings of an RN-Flow: those of an RN, and what it is shown."""
 
-    flow: FlowSettings = FlowSettings()  # what counts as evidence of motion; the network learns what it is worth
+    flow: HintSettings = HintSettings()  # what is shown to it
 
 
 class ResidualFlow(Residual):

@@ -11,7 +11,6 @@ from support.recordings import recording
 from semgrid_eval.classes import CLASS_COUNT, CLASS_NAMES, UNKNOWN
 from semgrid_eval.config import parse_config
 from semgrid_eval.errors import ConfigError
-from semgrid_eval.models.flow import MoveOn
 from semgrid_eval.models.residual import LEAD_BINS, Residual
 from semgrid_eval.models.residual_flow import ResidualFlow
 from semgrid_eval.windows.data import select_windows
@@ -88,4 +87,3 @@ def test_what_cannot_move_is_refused():
     with pytest.raises(ConfigError, match=r"window\.inputs: motion is seen between two inputs, and there is one"):
         ResidualFlow.check(settings, given(inputs=1))
     assert ResidualFlow.in_words(settings).endswith("channels, shown what moves on")
-    assert settings.flow == parse_config(MoveOn.Settings, {})
