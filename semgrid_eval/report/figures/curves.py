@@ -51,7 +51,7 @@ def calibration_plots(scores: Scores) -> list[Plot]:
     if not curves:
         return []
     with mpl.rc_context(SETTINGS):
-        figure = Figure(figsize=(7.4, 4.6), layout="constrained")
+        figure = Figure(figsize=(7.4, max(4.6, 0.18 * len(curves))), layout="constrained")  # as high as its legend
         right, cells = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
         right.plot([0, 1], [0, 1], color=INK, linewidth=0.8, linestyle=":")
         for (entry, table), stroke in zip(curves, line_styles([entry.row for entry, _ in curves]), strict=True):
@@ -63,7 +63,7 @@ def calibration_plots(scores: Scores) -> list[Plot]:
         right.set(ylabel="share of right cells", xlim=(0, 1), ylim=(0, 1))
         cells.set(xlabel="certainty", ylabel="of all cells", yscale="log")
         cells.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{100 * share:g}%"))
-        legend = right.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        legend = figure.legend(*right.get_legend_handles_labels(), fontsize=8, loc="outside right upper")
         mark_legend(legend, [[entry.row] for entry, _ in curves])
         return [finish(figure, "calibration", "calibration.csv", _CAPTION)]
 

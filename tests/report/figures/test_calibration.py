@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,14 @@ def test_trained_rows_have_a_calibration_curve_and_sure_baselines_none(scores):
     assert f"ED-DC, error {scores['ED-DC'].mean['calibration_error']:.3f}" in plot.svg
     assert "BL-DC" not in plot.svg
     assert calibration_plots({name: entry for name, entry in scores.items() if entry.row.is_baseline}) == []
+
+
+def test_a_long_legend_does_not_drive_the_panels_apart(scores):
+    (plot,) = calibration_plots({f"{number}": scores["ED-DC"] for number in range(30)})
+    panels = re.findall(r'<g id="axes_\d">\s*<g id="patch_\d+">\s*<path d="([^"]*)"', plot.svg)
+    heights = [[float(y) for y in re.findall(r"[ML] \S+ (\S+)", path)] for path in panels]
+    (_, upper_end), (lower_begin, lower_end) = ((min(each), max(each)) for each in heights)
+    assert lower_begin - upper_end < 0.1 * lower_end
 
 
 def test_the_table_has_the_cells_of_all_repeats(scores):
