@@ -5,8 +5,8 @@ from importlib import resources
 
 import pytest
 
-from semgrid_eval.config import parse_config
 from semgrid_eval.models.encoder_decoder import EncoderDecoderSettings
+from semgrid_eval.models.registry import find_model
 from semgrid_eval.models.residual import ResidualSettings
 from semgrid_eval.presets import preset_names
 from semgrid_eval.runs.matrix import load_matrix
@@ -20,7 +20,7 @@ def test_paper_has_the_rows_of_table_a1_in_its_order():
         published = [line["experiment"] for line in csv.DictReader(stream)]
     rows = load_matrix("paper").rows
     assert [row.name for row in rows[: len(published)]] == published
-    assert {row.model for row in rows[len(published) :]} == {"residual"}
+    assert {row.model for row in rows[len(published) :]} == {"residual", "residual-flow"}
 
 
 def test_one_training_answers_every_lead_of_the_paper():
@@ -66,7 +66,8 @@ def test_paper_cpu_has_the_rows_of_paper_the_stronger_baselines_and_what_is_poss
     assert {(settings.features, settings.training.batch) for settings in trained} == {(32, 8)}
     assert {settings.training.updates_until(settings.training.epochs) for settings in trained} == {2200}
     assert {row.repeats for row in scaled} == {1}
-    residual = [parse_config(ResidualSettings, row.settings).training for row in scaled if row.model == "residual"]
+    names = ("residual", "residual-flow")
+    residual = [find_model(row.model).parse_settings(row.settings).training for row in scaled if row.model in names]
     assert set(residual) == {ResidualSettings().training}
 
 
@@ -75,7 +76,7 @@ def test_real_trains_as_paper_cpu_and_scores_windows_that_fit_ten_frames():
     rows = load_matrix("real").rows
     assert {row.name for row in rows} == set(scaled) - {
         *("BL-PH2", "ED-PH2", "BL-PH3", "ED-PH3", "ED-SL4", "ED-SL5", "BL-Fuse-SL5", *TOLD),
-        *("RN-PH2", "RN-PH3", "RN-any-PH2", "RN-any-PH3", "RN-SL5"),
+        *("RN-PH2", "RN-PH3", "RN-any-PH2", "RN-any-PH3", "RN-SL5", "RN-Flow-SL5"),
     }
     for row in rows:
         alike = {"validation_window": None, "second_target": "expected"}

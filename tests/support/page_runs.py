@@ -21,6 +21,7 @@ LESS = {
     "latency": "--frames 6 --warm-up 2",
     "run paper-cpu": "--row BL-DC --row BL-Fuse --jobs 1",
     "run real": "--row BL-DC --jobs 1",
+    "run remedies": "--row 'BL-*' --jobs 1",
     "run disturb": "--row 'BL-DC*' --jobs 1",
     "run stream-cpu": "--row 'newest +0' --row 'BL-Fuse +40' --row 'RN-town +0' --jobs 1",
     "run baselines --model": "--row Mine --row BL-DC",

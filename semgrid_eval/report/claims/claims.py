@@ -29,8 +29,8 @@ _MEAN = "mean_known"
 _BASELINES = ("BL-DC", "BL-Fuse", "BL-Table", "BL-Flow")
 _HORIZONS = ("DC", "PH1", "PH2", "PH3")
 _RESIDUAL = (
-    *(("RN-DC", other) for other in (*_BASELINES, "ED-DC")),
-    *(("RN-SL5", other) for other in ("BL-DC", "BL-Flow", "BL-Fuse-SL5", "ED-SL5")),
+    *((first, other) for first in ("RN-DC", "RN-Flow-DC") for other in (*_BASELINES, "ED-DC")),
+    *((first, other) for first in ("RN-SL5", "RN-Flow-SL5") for other in ("BL-DC", "BL-Flow", "BL-Fuse-SL5", "ED-SL5")),
 )
 _BUILD = re.compile(r"ED-d(\d+)-f(\d+)")
 _DEFAULT_ENDS = {"deeper": ("ED-d4-f64", "ED-d2-f64"), "wider": ("ED-d3-f64", "ED-d3-f16")}

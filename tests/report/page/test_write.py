@@ -215,7 +215,7 @@ def test_one_row_only(lonely):
     assert "BL-DC has the highest mean IoU of known classes" in text
     assert "no other row to compare with" in text
     assert "No row was trained" in text
-    assert "This run lacks the rows to test any of the 43 claims" in text
+    assert "This run lacks the rows to test any of the 61 claims" in text
     assert "No log here tells where the actors truly are" in text
     assert "actors" not in set(pd.read_csv(lonely.parent / "summary.csv").division)
 
