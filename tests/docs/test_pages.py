@@ -26,7 +26,7 @@ MORE = [ROOT / name for name in ("ARCHITECTURE.md", "CONTRIBUTING.md", "reports/
 TAKEN_AS_GIVEN = (
     "SRC PREDICTIONS TREE/pred_sequence LOGS/val RUN logs/val drives/val recordings town runs/first runs/stream "
     "runs/before runs/after runs/own runs/paper/trainings back/run/trainings drive labelled runs/drive cityscapes "
-    "varied real town-v1/small varied-town/trainings"
+    "varied real town-v1/small/val varied-town/trainings"
 )
 
 
