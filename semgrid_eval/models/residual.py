@@ -87,16 +87,21 @@ class Residual(Network):
     @classmethod
     def check(cls, settings: ResidualSettings, given: Given) -> None:
         """Refuse to move what does not."""
-        if settings.shift and not given.classes.movable:
-            raise ConfigError("no class of grid.classes moves, and that is what it is for", field="settings.shift")
+        if settings.shift:
+            require_what_moves(given.classes, "settings.shift")
 
     def prepare(self, windows: WindowSet) -> None:
         """Count the table."""
         if self.prior is not None:
-            self.prior.count(windows)
+            self.prior.count(windows, self.shown)
+
+    def shown(self, batch: WindowBatch) -> WindowBatch:
+        """Return a batch as the layers and the table see it."""
+        return batch
 
     def forward(self, batch: WindowBatch) -> Tensor:
         """Score the target: (B, C, H, W) logits."""
+        batch = self.shown(batch)
         planes = input_planes(batch.past, self.given.classes.count)
         rows, columns = planes.shape[-2:]
         multiple = FOLD * 2 ** len(self.narrow)
@@ -121,6 +126,16 @@ class Residual(Network):
             larger = F.interpolate(self.widen[level](features), scale_factor=2, mode="nearest")
             features = self.up[level](larger + skips.pop())
         return torch.as_tensor(features)
+
+
+def require_what_moves(classes: ClassSet, field: str) -> None:
+    """Refuse what is there for motion where no class moves; `field` of the row asks for it.
+
+    Raises:
+        ConfigError: none does.
+    """
+    if not classes.movable:
+        raise ConfigError("no class of grid.classes moves, and that is what it is for", field=field)
 
 
 class _Convolution(nn.Sequential):

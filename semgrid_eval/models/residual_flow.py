@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import torch
 from pydantic import Field
-from torch import Tensor
 
 from semgrid_eval.classes import UNKNOWN
 from semgrid_eval.errors import ConfigError
 from semgrid_eval.models.flow import FlowSettings, MoveOn
 from semgrid_eval.models.model import Given
 from semgrid_eval.models.overlay import newest_first, overlay
-from semgrid_eval.models.residual import Residual, ResidualSettings
-from semgrid_eval.windows.data import WindowBatch, WindowSet
+from semgrid_eval.models.residual import Residual, ResidualSettings, require_what_moves
+from semgrid_eval.windows.data import WindowBatch
 
 
 class HintSettings(FlowSettings):
@@ -51,19 +50,9 @@ class ResidualFlow(Residual):
         super().check(settings, given)
         if given.inputs < 2:
             raise ConfigError("motion is seen between two inputs, and there is one", field="window.inputs")
-        if not given.classes.movable:
-            raise ConfigError("no class of grid.classes moves, and that is what it is for", field="model")
+        require_what_moves(given.classes, "model")
 
-    def prepare(self, windows: WindowSet) -> None:
-        """Count the table over what it is shown."""
-        if self.prior is not None:
-            self.prior.count(windows, self._shown)
-
-    def forward(self, batch: WindowBatch) -> Tensor:
-        """Score the target: (B, C, H, W) logits."""
-        return super().forward(self._shown(batch))
-
-    def _shown(self, batch: WindowBatch) -> WindowBatch:
+    def shown(self, batch: WindowBatch) -> WindowBatch:
         """Append what moves on, as an input of the first sensor at the time of the newest."""
         shown = torch.full_like(batch.past[:, :, :1], UNKNOWN)  # (B, S, 1, H, W)
         if not batch.past.is_meta:  # where only shapes are asked for

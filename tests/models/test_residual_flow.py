@@ -58,7 +58,7 @@ def test_it_begins_with_cars_where_they_drive_to_and_the_network_without_does_no
 def test_it_is_shown_no_more_than_the_cells_that_the_motion_changes(windows):
     net = network(ResidualFlow, given(size=SIZE), **SMALL, **FAST).eval()
     batch = windows.batch(slice(1))
-    shown = net._shown(batch)
+    shown = net.shown(batch)
     assert shown.past.shape == (1, 1, 3, SIZE, SIZE)
     assert torch.equal(shown.past[:, :, :2], batch.past)
     moved = shown.past[0, 0, 2]
@@ -67,7 +67,7 @@ def test_it_is_shown_no_more_than_the_cells_that_the_motion_changes(windows):
     assert torch.equal(moved == ROAD, batch.past[0, 0, 1] == CAR)
     assert torch.equal(shown.lead_s[:, 2], batch.lead_s[:, 1])
     still = replace(batch, past=batch.past[:, :, :1].expand_as(batch.past))
-    assert not net._shown(still).past[:, :, 2].any()
+    assert not net.shown(still).past[:, :, 2].any()
 
 
 def test_several_sensors_are_one_to_what_looks_for_motion(windows):
@@ -75,8 +75,8 @@ def test_several_sensors_are_one_to_what_looks_for_motion(windows):
     batch = windows.batch(slice(2))
     past = batch.past.repeat(1, 2, 1, 1, 1)
     past[:, 0, :, :, SIZE // 2 :] = past[:, 1, :, :, : SIZE // 2] = UNKNOWN
-    shown = net._shown(replace(batch, past=past, sensors=("left", "right"))).past
-    alone = network(ResidualFlow, given(size=SIZE), **SMALL, **FAST)._shown(batch).past
+    shown = net.shown(replace(batch, past=past, sensors=("left", "right"))).past
+    alone = network(ResidualFlow, given(size=SIZE), **SMALL, **FAST).shown(batch).past
     assert torch.equal(shown[:, 0, 2], alone[:, 0, 2])
     assert not shown[:, 1, 2].any()
     assert net(replace(batch, past=past)).shape == (2, CLASS_COUNT, SIZE, SIZE)
